@@ -320,6 +320,9 @@ enum wormd_command_kind {
   /* Note that a command did not come this far, because it came too late: over the network, or to a relay that
      stood still. The sender is NAME: COMMAND. Moves and permits nothing. */
   WORMD_COMMAND_KIND_STALE = 11,
+  /* Note that a command did not come this far, because too many wait for the controller, or too many watchers
+     of a laptop command over the network. The sender is NAME: COMMAND. Moves and permits nothing. */
+  WORMD_COMMAND_KIND_BUSY = 12,
 };
 
 /* The name, as in logs; "unknown" for a code of a newer version. */
@@ -337,6 +340,7 @@ static inline const char *wormd_command_kind_name(uint32_t code) {
     case WORMD_COMMAND_KIND_NOT_DRIVER: return "not-driver";
     case WORMD_COMMAND_KIND_NOT_PERMITTED: return "not-permitted";
     case WORMD_COMMAND_KIND_STALE: return "stale";
+    case WORMD_COMMAND_KIND_BUSY: return "busy";
     default: return "unknown";
   }
 }

@@ -1,6 +1,7 @@
 //! Asking a controller at its stop socket.
 
 use super::stop_socket::{ANSWER_TIMEOUT, Answer, Question, Request, name_parts, peer_of};
+use crate::realtime::is_suspended;
 use nix::sys::socket::{self, AddressFamily, SockFlag, SockType, UnixAddr};
 use std::collections::BTreeSet;
 use std::io::{self, BufRead, BufReader, Write};
@@ -11,6 +12,9 @@ use worm_estimator::config::Config;
 
 /// How long the controller may take to answer; it itself waits up to [`ANSWER_TIMEOUT`] for its loop.
 const TIMEOUT: Duration = ANSWER_TIMEOUT.saturating_add(Duration::from_secs(1));
+/// How long one that is suspended may take, and how often that is looked at.
+const SUSPENDED_TIMEOUT: Duration = Duration::from_secs(1);
+const LOOK: Duration = Duration::from_millis(250);
 /// How long a socket that takes no connection is tried, and how often.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 const CONNECT_POLL: Duration = Duration::from_millis(10);
@@ -190,13 +194,24 @@ fn choose<S>(worm: &str, sockets: Vec<(u32, S)>, caller: u32) -> Result<Vec<(u32
 
 /// Puts the question and waits for the answer.
 pub(super) fn put(question: &Question, mut stream: UnixStream) -> io::Result<Answer> {
-    stream.set_read_timeout(Some(TIMEOUT))?;
+    let pid = peer_of(&stream)?.pid();
+    stream.set_read_timeout(Some(LOOK))?;
     stream.set_write_timeout(Some(TIMEOUT))?;
     let mut line = serde_json::to_string(question)?;
     line.push('\n');
     stream.write_all(line.as_bytes())?;
     line.clear();
-    BufReader::new(stream).read_line(&mut line)?;
+    let mut reader = BufReader::new(stream);
+    let begun = Instant::now();
+    while let Err(error) = reader.read_line(&mut line) {
+        let limit = match u32::try_from(pid).is_ok_and(is_suspended) {
+            true => SUSPENDED_TIMEOUT,
+            false => TIMEOUT,
+        };
+        if error.kind() != io::ErrorKind::WouldBlock || begun.elapsed() >= limit {
+            return Err(error);
+        }
+    }
     Ok(serde_json::from_str(&line)?)
 }
 

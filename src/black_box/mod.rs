@@ -14,13 +14,14 @@
 //! - [`copy`]: copies that can be broken off at any byte.
 //! - [`keeper`]: messages in, files out.
 //! - [`run`]: the process around it; [`status`]: its reports.
-//! - [`standing`]: what its folder does not show, for whoever looks for a box.
+//! - [`place`]: which folder it is, for whoever looks for a box; [`standing`]: what its folder does not show.
 
 pub(crate) mod copy;
 mod events;
 pub(crate) mod folder;
 mod keeper;
 mod part_file;
+pub(crate) mod place;
 mod ring;
 mod run;
 pub(crate) mod standing;

@@ -3,6 +3,7 @@
 
 use super::folder::OwnFolder;
 use super::keeper::{Figures, Keeper, Now};
+use super::place;
 use super::status::{Received, Reporter};
 use crate::attendance::RoundCounter;
 use crate::failure::Failure;
@@ -66,6 +67,7 @@ impl BlackBox {
         signal_hook::flag::register(libc::SIGXFSZ, Arc::default()).map_err(Failure::failed)?;
         let role = RoleLock::<Role>::take(&instance).map_err(Failure::unusable)?;
         let folder = OwnFolder::take(folder).map_err(Failure::unusable)?;
+        place::remember(config, folder.folder().path());
         let hub = Hub::open(&instance).map_err(Failure::failed)?;
         let topics = RecordedTopics::open(&hub, Channel::ALL)?;
         let reporter = Reporter::open(&hub, role).map_err(Failure::failed)?;

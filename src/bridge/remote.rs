@@ -181,6 +181,7 @@ impl Remote {
             // There is always room for somebody who wants to halt.
             let limit = if is_halt { 2 * MAX_SEATS } else { MAX_SEATS };
             if self.seats.len() >= limit {
+                note(NetworkRefusal::Busy);
                 let refusal = format!("{limit} watchers of this laptop may command already: close some");
                 return self.backlog.add_answer(from, refuse("busy", refusal));
             }

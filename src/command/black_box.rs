@@ -3,6 +3,7 @@
 use super::{Failure, WormArgs, log_line, print};
 use crate::black_box::copy::{Checksum, Source, checksum, copy};
 use crate::black_box::folder::{Entry, FileKind, Folder, open_from};
+use crate::black_box::place::Place;
 use crate::black_box::standing::{Standing, remarks, why_no_box};
 use clap::{Args, Subcommand};
 use std::fmt::Write as _;
@@ -31,7 +32,8 @@ enum Action {
 /// Which black box.
 #[derive(Debug, Clone, Args)]
 pub(super) struct PlaceArgs {
-    /// Folder of the black box; without it, `black_box.folder` of the configuration, or /var/lib/wormd/NAME/black-box
+    /// Folder of the black box; without it, `black_box.folder` of the configuration or /var/lib/wormd/NAME/black-box, or the folder that
+    /// `wormd up --black-box` of this user wrote to since then
     #[arg(long, value_name = "DIR")]
     folder: Option<PathBuf>,
     #[command(flatten)]
@@ -102,7 +104,15 @@ impl PlaceArgs {
         if let Some(folder) = &self.folder {
             return Ok(Folder::new(folder));
         }
-        Ok(Folder::configured(&self.worm.load()?))
+        let config = self.worm.load()?;
+        let folder = Place::of(&config).folder();
+        if folder.path() != Folder::configured(&config).path() {
+            let (worm, path) = (&config.worm.name, folder.path().display());
+            log_line(format_args!(
+                "note: the black box of {worm} wrote to {path} last: its boxes are meant (--folder names others)"
+            ));
+        }
+        Ok(folder)
     }
 
     /// The file of a box, by name, number or "last".

@@ -2,6 +2,7 @@
 
 use super::{Failure, WormArgs, ending_signals, print};
 use crate::black_box::folder::Folder;
+use crate::black_box::place::Place;
 use crate::dashboard::server::{self, Settings};
 use crate::dashboard::{Token, listen};
 use crate::supervisor::controller::refuse_foreign;
@@ -31,7 +32,7 @@ pub struct DashboardArgs {
     /// Folder with reports of finished runs: folders that have a report.html
     #[arg(long, value_name = "DIR")]
     reports: Option<PathBuf>,
-    /// Folder of the black box, where it is another one than the configuration's
+    /// Folder of the black box; without it, that of the configuration, or where the worm's black box of this user wrote last
     #[arg(long, value_name = "DIR")]
     black_box: Option<PathBuf>,
 }
@@ -90,8 +91,8 @@ fn serve(args: &DashboardArgs, config: worm_estimator::config::Config, instance:
     let mut hosts = args.host.clone();
     hosts.extend(own_names());
     let boxes = match &args.black_box {
-        Some(folder) => Folder::new(folder),
-        None => Folder::configured(&config),
+        Some(folder) => Place::Given(Folder::new(folder)),
+        None => Place::of(&config),
     };
     let settings = Settings {
         boxes,

@@ -6,7 +6,7 @@ use super::fleet::FleetThread;
 use super::places::Places;
 use super::relay_thread::{RelayThread, Shared};
 use super::strangers::Strangers;
-use crate::black_box::folder::Folder;
+use crate::black_box::place::Place as BoxPlace;
 use std::net::IpAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -24,6 +24,6 @@ pub(super) struct App {
     pub(super) strangers: Strangers,
     pub(super) hosts: Hosts,
     pub(super) reports: Option<PathBuf>,
-    pub(super) boxes: Folder,
+    pub(super) boxes: BoxPlace,
     pub(super) places: Arc<Places>,
 }

@@ -85,12 +85,18 @@ async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Res
     let refusal = {
         let headers = request.headers();
         let text = |name: HeaderName| headers.get(name).map(|value| value.to_str().unwrap_or("?"));
-        app.hosts.refusal(Source {
-            host: text(HOST),
-            origin: text(ORIGIN),
-            site: text(HeaderName::from_static("sec-fetch-site")),
-            is_navigation: request.method() == Method::GET
-                && text(HeaderName::from_static("sec-fetch-mode")) == Some("navigate"),
+        let twice = [HOST, ORIGIN]
+            .into_iter()
+            .find(|name| headers.get_all(name).iter().nth(1).is_some());
+        let twice = twice.map(|name| format!("the request has more than one {name}"));
+        twice.or_else(|| {
+            app.hosts.refusal(Source {
+                host: text(HOST),
+                origin: text(ORIGIN),
+                site: text(HeaderName::from_static("sec-fetch-site")),
+                is_navigation: request.method() == Method::GET
+                    && text(HeaderName::from_static("sec-fetch-mode")) == Some("navigate"),
+            })
         })
     };
     let mut response = match refusal {
@@ -220,22 +226,25 @@ async fn open_report(State(app): State<Arc<App>>, Path(wanted): Path<String>) ->
 }
 
 async fn list_boxes(State(app): State<Arc<App>>) -> Response {
-    let folder = app.boxes.clone();
-    let path = folder.path().display().to_string();
-    let list = move || match folder.path().exists() {
-        true => folder.boxes().map_err(std::io::Error::other),
-        // Where no black box has ever been there is no folder, which is no error of the page.
-        false => Ok(Vec::new()),
+    let place = app.boxes.clone();
+    let list = move || {
+        let folder = place.folder();
+        let boxes = match folder.path().exists() {
+            true => folder.boxes().map_err(std::io::Error::other)?,
+            // Where no black box has ever been there is no folder, which is no error of the page.
+            false => Vec::new(),
+        };
+        Ok((folder.path().display().to_string(), boxes))
     };
     match in_background(list).await {
-        Ok(boxes) => to_json(StatusCode::OK, &json!({ "folder": path, "boxes": boxes })),
+        Ok((folder, boxes)) => to_json(StatusCode::OK, &json!({ "folder": folder, "boxes": boxes })),
         Err(why) => refused(StatusCode::INTERNAL_SERVER_ERROR, &why),
     }
 }
 
 async fn download_box(State(app): State<Arc<App>>, Path(wanted): Path<String>, headers: HeaderMap) -> Response {
-    let folder = app.boxes.clone();
-    match in_background(move || boxes::open(&folder, &wanted)).await {
+    let place = app.boxes.clone();
+    match in_background(move || boxes::open(&place.folder(), &wanted)).await {
         Ok(Some(file)) => file.answer(&headers),
         Ok(None) => refused(
             StatusCode::NOT_FOUND,

@@ -10,7 +10,7 @@ use super::places::{Place, Places, Stage};
 use super::relay_thread::{RelayThread, Shared};
 use super::routes::router;
 use super::strangers::Strangers;
-use crate::black_box::folder::Folder;
+use crate::black_box::place::Place as BoxPlace;
 use crate::failure::Failure;
 use crate::relay::client::RelayLink;
 use crate::relay::wire::Subject;
@@ -60,7 +60,7 @@ pub(crate) struct Settings {
     /// Where reports are.
     pub(crate) reports: Option<PathBuf>,
     /// The black box's.
-    pub(crate) boxes: Folder,
+    pub(crate) boxes: BoxPlace,
 }
 
 /// Serves until a byte can be read from `end`.

@@ -1,6 +1,6 @@
 //! Robots and worms that a fleet process of this computer is there for, and that nobody can hold from here.
 
-use crate::topics::fleet_list::{FleetList, FoundList, ListedRobot, read_all};
+use crate::topics::fleet_list::{FleetList, FoundList, ListedRobot, read_all_and_damaged};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -17,7 +17,8 @@ pub(super) struct Unreached {
 
 /// What the lists in the folder of all worms name, and nobody reaches: `is_reached` says whether a process offers a worm here.
 pub(super) fn find(root: &Path, is_reached: impl Fn(&str, u32) -> bool) -> Vec<Unreached> {
-    let (alive, dead): (Vec<_>, Vec<_>) = read_all(root).into_iter().partition(FoundList::is_alive);
+    let (lists, damaged) = read_all_and_damaged(root);
+    let (alive, dead): (Vec<_>, Vec<_>) = lists.into_iter().partition(FoundList::is_alive);
     let standings = || {
         let lists = alive.iter().map(|found| &found.list);
         lists.flat_map(|list| list.robots.iter().map(move |(robot, standing)| (list, robot, standing)))
@@ -68,7 +69,21 @@ pub(super) fn find(root: &Path, is_reached: impl Fn(&str, u32) -> bool) -> Vec<U
         robot: robot.clone(),
         problem,
     });
-    unreached.collect()
+    unreached.chain(damaged.iter().map(|file| of_damaged(file))).collect()
+}
+
+/// Robots of which nobody knows which they are.
+fn of_damaged(file: &Path) -> Unreached {
+    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Unreached {
+        robot: name.clone(),
+        name,
+        problem: format!(
+            "{} should be the list of a `wormd fleet` process and is damaged, or of another version: its robots are not known, and cannot be \
+             held from here. Start that process again with this version, and remove the file",
+            file.display()
+        ),
+    }
 }
 
 /// Whether two processes hear the same bridge, as far as that is known.
@@ -103,6 +118,7 @@ fn was_killed(left: &FoundList, robot: &str, name: &str) -> String {
 mod tests {
     use super::*;
     use crate::topics::PublishedList;
+    use crate::topics::fleet_list::read_all;
 
     fn standing(worms: &[(&str, Option<&str>)]) -> ListedRobot {
         let worms = worms
@@ -177,13 +193,16 @@ mod tests {
         let keys: Vec<_> = find_all().into_iter().map(|(key, _)| key).collect();
         let killed = [key("robot4", "v"), key("robot5", "robot5")];
         assert_eq!(keys[2..], killed);
-        // Others' files of such a name are no lists.
-        std::fs::write(root.join("fleet-x.json"), "{").expect("can be written");
+        // What is no file is no list; one that is damaged may be about any robot.
         std::fs::create_dir(root.join("fleet-y.json")).expect("can be made");
-
         drop(list);
+        assert_eq!(find_all().len(), 3, "{:?}", find_all());
+        std::fs::write(root.join("fleet-x.json"), "{").expect("can be written");
         let found = find_all();
-        assert_eq!(found.len(), 3, "{found:?}");
+        assert_eq!(found.len(), 4, "{found:?}");
+        let (damaged, problem) = &found[3];
+        assert_eq!(damaged, &key("fleet-x.json", "fleet-x.json"));
+        assert!(problem.contains("is damaged"), "{problem}");
     }
 
     #[test]

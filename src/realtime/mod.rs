@@ -12,11 +12,13 @@ mod cpus;
 mod effective;
 pub mod machine;
 mod request;
+mod suspended;
 mod witness;
 
 pub use effective::{EffectiveSettings, Policy};
 pub(crate) use request::set_fifo;
 pub use request::{Grant, Refusal, request};
+pub(crate) use suspended::is_suspended;
 pub use witness::{CpuWitness, visit_every_cpu};
 
 use nix::sys::time::TimeSpec;

@@ -9,6 +9,7 @@ use crate::supervisor::controller::{self, command};
 use crate::topics::{CommandClient, Hub};
 use crate::trip::{self, wire::Question};
 use crossbeam::channel::{Receiver, Sender, TrySendError, bounded};
+use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::thread::JoinHandle;
@@ -18,6 +19,9 @@ use worm_estimator::message::{AlarmKind, Command, CommandKind, ShortText};
 
 /// Commands that may wait. The controller answers within a tick unless it arms or resets.
 const QUEUE: usize = 32;
+
+/// Remarks that may wait until fewer commands do.
+const REMARKS: usize = 16;
 
 /// How long the controller may take for a remark: whoever commands waits behind it.
 const REMARK_TIMEOUT: Duration = Duration::from_millis(100);
@@ -67,6 +71,8 @@ pub(super) struct Commander {
     outcomes: Receiver<Outcome>,
     /// Has a byte to read for each outcome, as far as they fit.
     answered: UnixStream,
+    /// Remarks that wait: commands come first.
+    remarks: VecDeque<Command>,
 }
 
 impl Commander {
@@ -107,6 +113,7 @@ impl Commander {
             thread: Some(thread),
             outcomes,
             answered,
+            remarks: VecDeque::new(),
         })
     }
 
@@ -118,12 +125,23 @@ impl Commander {
         }
     }
 
-    /// Hands over a remark, unless much waits: commands come first, and the log has it anyway.
-    pub(super) fn remark(&self, remark: Command) {
-        if let Some(jobs) = self.jobs.as_ref().filter(|jobs| jobs.len() < QUEUE / 8)
-            && jobs.try_send(Job::Remark(remark)).is_err()
+    /// Takes a remark, which is handed over as soon as little waits. What is too much is left out: the log has it anyway.
+    pub(super) fn remark(&mut self, remark: Command) {
+        if self.remarks.len() < REMARKS {
+            self.remarks.push_back(remark);
+        }
+        self.hand_over_remarks();
+    }
+
+    /// Hands over what was remarked, unless much waits: commands come first.
+    pub(super) fn hand_over_remarks(&mut self) {
+        let Some(jobs) = &self.jobs else { return };
+        while jobs.len() < QUEUE / 8
+            && let Some(remark) = self.remarks.pop_front()
         {
-            tracing::debug!("nobody records what was refused or taken over");
+            if jobs.try_send(Job::Remark(remark)).is_err() {
+                return tracing::debug!("nobody records what was refused or taken over");
+            }
         }
     }
 

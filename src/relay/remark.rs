@@ -1,5 +1,5 @@
 //! What never comes as far as the controller and every recording is to say all the same: who took over, who was refused because another
-//! drives or because it was too late, and whom a bridge has refused.
+//! drives, because it was too late or because too many were before it, and whom a bridge has refused.
 
 use super::departure::{name_within, printable};
 use super::drive::WatcherId;
@@ -30,6 +30,7 @@ fn refused_by_bridge(verdict: NetworkRefusal, name: &str, command: &str) -> Stri
     let why = match verdict {
         NetworkRefusal::NotPermitted => "the certificate may watch and hold, and nothing else",
         NetworkRefusal::Stale => "it came too late over the network",
+        NetworkRefusal::Busy => "too many watchers of its laptop command already",
     };
     format!("{command} from {name} was refused by the bridge: {why}")
 }
@@ -61,6 +62,9 @@ pub(crate) fn in_words(record: &CommandRecord) -> Option<String> {
         // By the bridge or by the relay.
         Ok(CommandKind::Stale) => Some(format!(
             "{command} from {name} (user {user}) was refused: it came too late"
+        )),
+        Ok(CommandKind::Busy) => Some(format!(
+            "{command} from {name} (user {user}) was refused: too many commands or watchers were before it"
         )),
         _ => None,
     }
@@ -131,6 +135,10 @@ mod tests {
         let (record, said) = by_bridge(NetworkRefusal::Stale, "hall at the\u{fffd}\n", 0, "crawl");
         assert!(said.contains("was refused by the bridge: it came too late"), "{said}");
         let words = "crawl from hall at the\u{fffd} (user 0) was refused: it came too late";
+        assert_eq!(recorded(&record).as_deref(), Some(words));
+        let (record, said) = by_bridge(NetworkRefusal::Busy, "hall", 0, "crawl");
+        assert!(said.contains("refused by the bridge: too many watchers"), "{said}");
+        let words = "crawl from hall (user 0) was refused: too many commands or watchers were before it";
         assert_eq!(recorded(&record).as_deref(), Some(words));
         assert_eq!(recorded(&Command::new(CommandKind::Hold)), None);
         // Who asks on and on stands there once a second, and not at the cost of others.

@@ -304,6 +304,7 @@ impl Server {
                         if name == "crawl" {
                             self.drive.crawl_ended();
                         }
+                        self.record_refusal(CommandKind::Busy, id, user, name);
                         refused(
                             "busy",
                             "too many commands wait for the controller: try again".to_owned(),
@@ -332,6 +333,7 @@ impl Server {
     }
 
     fn take_outcomes(&mut self) {
+        self.commander.hand_over_remarks();
         let outcomes: Vec<_> = self.commander.outcomes().collect();
         for outcome in outcomes {
             match outcome {

@@ -349,6 +349,8 @@ pub(crate) enum NetworkRefusal {
     NotPermitted,
     /// It came too late.
     Stale,
+    /// Too many watchers of the laptop command already.
+    Busy,
 }
 
 impl NetworkRefusal {
@@ -357,6 +359,7 @@ impl NetworkRefusal {
         match self {
             Self::NotPermitted => CommandKind::NotPermitted,
             Self::Stale => CommandKind::Stale,
+            Self::Busy => CommandKind::Busy,
         }
     }
 }

@@ -6,6 +6,7 @@ use super::instance::Instance;
 use super::role::{Controller, Relay, RoleLock};
 use super::services::{Ipc, MAX_READERS, MAX_WRITERS, Services};
 use super::start::Presence;
+use crate::realtime::is_suspended;
 use iceoryx2::active_request::ActiveRequest;
 use iceoryx2::pending_response::PendingResponse;
 use iceoryx2::port::client::Client;
@@ -66,6 +67,17 @@ pub enum CommandError {
         pid: u32,
         /// How long the client waited.
         waited: Duration,
+    },
+    /// A controller is there and is suspended; it will not carry the command out later.
+    #[error(
+        "the controller of {worm} (process {pid}) is suspended, by a signal or a debugger, and answers nobody; without its requests the servo's \
+         watchdog stops the motor: let it go on (kill -CONT {pid}), or end it (kill -KILL {pid})"
+    )]
+    Suspended {
+        /// The worm.
+        worm: String,
+        /// The controller.
+        pid: u32,
     },
     /// The controller took the command and ended without an answer; whether it was carried out is not known.
     #[error("the controller of {worm} ended before it answered: see its log, start it again, and repeat the command")]
@@ -177,10 +189,14 @@ impl CommandClient {
                 return Err(self.nobody());
             };
             if begun.elapsed() >= timeout {
-                return Err(CommandError::NoAnswer {
-                    worm: self.instance().worm().to_owned(),
-                    pid,
-                    waited: timeout,
+                let worm = self.instance().worm().to_owned();
+                return Err(match is_suspended(pid) {
+                    true => CommandError::Suspended { worm, pid },
+                    false => CommandError::NoAnswer {
+                        worm,
+                        pid,
+                        waited: timeout,
+                    },
                 });
             }
             thread::sleep(POLL);

@@ -74,20 +74,30 @@ pub struct OfferedFrom {
     pub pid: u32,
 }
 
-/// The lists in a folder of worms, those of killed processes among them. What cannot be read is no list.
+/// The lists in a folder of worms, those of killed processes among them.
 pub(crate) fn read_all(root: &Path) -> Vec<FoundList> {
-    let entries = fs::read_dir(root).into_iter().flatten().flatten();
-    let is_one = |name: &str| name.starts_with(PREFIX) && name.ends_with(SUFFIX);
-    entries
-        .filter(|entry| entry.file_name().to_str().is_some_and(is_one))
-        .filter_map(|entry| {
-            let file = entry.path();
-            read(&file).map(|list| FoundList { list, file })
-        })
-        .collect()
+    let (lists, _) = read_all_and_damaged(root);
+    lists
 }
 
-fn read(file: &Path) -> Option<FleetList> {
+/// As [`read_all`], and the files of this user that should be lists and are none.
+pub(crate) fn read_all_and_damaged(root: &Path) -> (Vec<FoundList>, Vec<PathBuf>) {
+    let (mut lists, mut damaged) = (Vec::new(), Vec::new());
+    let entries = fs::read_dir(root).into_iter().flatten().flatten();
+    let is_one = |name: &str| name.starts_with(PREFIX) && name.ends_with(SUFFIX);
+    for entry in entries.filter(|entry| entry.file_name().to_str().is_some_and(is_one)) {
+        let file = entry.path();
+        match text(&file).map(|text| serde_json::from_slice(&text)) {
+            Some(Ok(list)) => lists.push(FoundList { list, file }),
+            Some(Err(_)) => damaged.push(file),
+            None => {}
+        }
+    }
+    (lists, damaged)
+}
+
+/// What stands in a file of this user; none where there is no such file.
+fn text(file: &Path) -> Option<Vec<u8>> {
     let flags = OFlag::O_NOFOLLOW | OFlag::O_NONBLOCK;
     let open = File::options().read(true).custom_flags(flags.bits()).open(file).ok()?;
     let metadata = open.metadata().ok()?;
@@ -97,7 +107,7 @@ fn read(file: &Path) -> Option<FleetList> {
     }
     let mut text = Vec::new();
     open.take(MAX_LENGTH).read_to_end(&mut text).ok()?;
-    serde_json::from_slice(&text).ok()
+    Some(text)
 }
 
 /// The worm of a robot that a fleet process offers under the name of this instance, whose watchers process `holder` serves.

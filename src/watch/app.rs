@@ -1,5 +1,6 @@
 //! The watch screen: keys become requests, lines of the relay become the picture. Pure: times are arguments, ns of one clock.
 
+use super::delay::Delay;
 use super::fault::LatchedFault;
 use super::ghost;
 use super::picture::Picture;
@@ -43,6 +44,8 @@ pub(crate) struct App {
     picture: Picture,
     /// Where the worm is while nothing is heard of it.
     ghost: Ghost,
+    /// How long frames from a robot elsewhere wait on the way.
+    delay: Delay,
     /// The number by which the relay knows this watcher.
     me: Option<u64>,
     panel: Panel,
@@ -65,6 +68,7 @@ impl App {
             seat,
             picture: Picture::new(subject),
             ghost: Ghost::default(),
+            delay: Delay::default(),
             me: None,
             panel: Panel::Overview,
             asked: None,
@@ -108,8 +112,12 @@ impl App {
         let picture = &self.picture;
         let frame_ns = match &picture.network {
             None => now_ns.saturating_sub(picture.time_ns),
-            // Of another computer's clock: what was on the way for longer than a round trip is not known here.
-            Some(network) => network.round_trip_ms.unwrap_or(0).saturating_mul(1_000_000),
+            // Of another computer's clock. The quickest took a round trip at most.
+            Some(network) => {
+                let round_trip_ns = network.round_trip_ms.unwrap_or(0).saturating_mul(1_000_000);
+                let waited_ns = self.delay.take(&network.boot_id, picture.time_ns, now_ns);
+                round_trip_ns.saturating_add(waited_ns)
+            }
         };
         let age_ns = |age_ms: Option<u64>| age_ms.map(|ms| frame_ns.saturating_add(ms.saturating_mul(1_000_000)));
         let is_fresh = [picture.ages.state, picture.ages.estimate]

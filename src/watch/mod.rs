@@ -7,6 +7,7 @@
 pub(crate) mod alarm_text;
 pub(crate) mod app;
 pub(crate) mod breakdown;
+mod delay;
 pub(crate) mod fault;
 mod ghost;
 pub(crate) mod inferred;

@@ -94,6 +94,15 @@ fn one_drives_with_the_token_and_anyone_may_halt() {
         );
         assert_eq!(watched.post("hold", &[header]).status == 403, status == 403, "{header}");
     }
+    // What a proxy in between took for the Host may be the other one.
+    let own = format!("Host: {}", watched.address);
+    for second in ["Host: evil.example", own.as_str()] {
+        assert_eq!(
+            request(watched.address, "GET", "/api/state", &[&own, second], "").status,
+            403,
+            "{second}"
+        );
+    }
     let page = watched.get("/");
     for part in [
         "default-src 'none'",

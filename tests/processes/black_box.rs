@@ -73,6 +73,17 @@ fn a_stop_leaves_a_box_that_says_why() {
     assert_eq!((&why["reason"]["cell"], &why["worm"]), (&2.into(), &worm.name().into()));
     let replay = worm.replay(&path.to_string_lossy());
     assert!(replay.status.success(), "{}", String::from_utf8_lossy(&replay.stderr));
+    // Who does not say where is shown what was kept last.
+    let output = worm.wormd(&["why", "--json", "--no-explain"]).output();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        output.status.success() && said.contains(&format!("wrote to {boxes} last")),
+        "{said}"
+    );
+    assert_eq!(
+        serde_json::from_slice::<serde_json::Value>(&output.stdout).ok(),
+        Some(why)
+    );
     let thin = json(&worm, &["black-box", "list", "--folder", &boxes, "--json", "--thin"]);
     assert_eq!(thin.as_array().map(Vec::len), Some(2), "{thin}");
 

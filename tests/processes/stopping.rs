@@ -2,6 +2,7 @@
 
 use super::worm::{Worm, wait_for};
 use super::{Crawling, PATIENCE};
+use nix::sys::signal::Signal;
 use std::os::unix::process::CommandExt;
 use std::process::{Command, Output, Stdio};
 use worm_estimator::message::{CommandKind, CommandOutcome, Mode};
@@ -148,4 +149,21 @@ fn an_alarm_can_be_acknowledged_by_name() {
             .state()
             .is_some_and(|state| state.mode == Mode::Crawling.code())
     });
+}
+
+#[test]
+fn who_stops_a_suspended_controller_is_told_how() {
+    let crawling = Crawling::start_again(Worm::on_a_steady_computer("asleep"));
+    crawling.controller.signal(Signal::SIGSTOP);
+    let (code, said) = stop(&crawling.worm);
+    crawling.controller.signal(Signal::SIGCONT);
+    let pid = crawling.controller.id();
+    assert_eq!(code, Some(1), "{said}");
+    for part in [
+        "is suspended",
+        &format!("kill -CONT {pid}"),
+        &format!("kill -KILL {pid}"),
+    ] {
+        assert!(said.contains(part), "{part} is not in {said}");
+    }
 }

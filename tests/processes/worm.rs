@@ -225,7 +225,12 @@ pub struct Invocation {
 impl Invocation {
     fn new(arguments: &[&str], pauses: Option<Arc<HostPauses>>) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_wormd"));
-        command.args(arguments).stdin(Stdio::null());
+        // What it remembers is not for the user who tests.
+        let state = concat!(env!("CARGO_TARGET_TMPDIR"), "/state");
+        command
+            .args(arguments)
+            .stdin(Stdio::null())
+            .env("XDG_STATE_HOME", state);
         Self {
             command,
             what: arguments.join(" "),

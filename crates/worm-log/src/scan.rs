@@ -13,7 +13,7 @@ use super::channel::{CHANNELS, CONFIG_ATTACHMENT, Channel, METADATA};
 use super::note::{NOTE, Note};
 use super::payload::{Encoding, Payload, PayloadError};
 use super::shape::{are_whole_records, is_data_end, is_of_data, is_whole, surplus, uncompressed_records};
-use super::summary::summary;
+use super::summary::{behind_the_footer, summary};
 use super::unpack::{BoundedZstd, MAX_RATIO};
 use crate::ReadError;
 use mcap::records::{Record, op};
@@ -125,7 +125,11 @@ pub fn scan_from(
         Ok(ControlFlow::Continue(()))
     });
     let problem = match end {
-        Ok(()) if is_whole => return scanner.into_contents(),
+        Ok(()) if is_whole => {
+            let behind = behind_the_footer(&mut input, at, length).map_err(|error| unreadable(path, &error))?;
+            scanner.warn_of_more(behind, length);
+            return scanner.into_contents();
+        }
         Ok(()) => "it was not finished".to_owned(),
         Err(Trouble::Broken(error)) => error,
         Err(Trouble::Unreadable(error)) => return Err(unreadable(path, &error)),
@@ -403,6 +407,16 @@ impl<'a, F: FnMut(Channel, Payload<'_>) -> Result<(), PayloadError>> Scanner<'a,
             _ => {}
         }
         Ok(())
+    }
+
+    /// Where a log ends before its file does, says so: what follows is another one.
+    fn warn_of_more(&mut self, behind: Option<u64>, length: u64) {
+        if let Some(end) = behind.filter(|end| *end < length) {
+            self.contents.warnings.push(format!(
+                "the log ends at byte {end} of {length}: what follows is left out. If a log was appended to it, `tail -c +{}` takes that out",
+                end + 1
+            ));
+        }
     }
 
     fn warn_of_the_end(&mut self, at: u64, length: u64, problem: &str, salvaged: u64) {

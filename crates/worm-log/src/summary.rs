@@ -5,7 +5,7 @@
 use super::shape::records;
 use mcap::MAGIC;
 use mcap::records::op;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::ops::Range;
 
 /// Bytes of the footer's record and of the magic bytes behind it.
@@ -72,6 +72,38 @@ pub(super) fn summary(input: &mut (impl Read + Seek), length: u64) -> io::Result
         summary.chunks.clear();
     }
     Ok(Some(summary))
+}
+
+/// Where the file of a log ends whose data end at byte `at`: behind its footer and the magic bytes; `None` where its summary is cut off or damaged.
+///
+/// # Errors
+/// When the file cannot be read.
+pub(super) fn behind_the_footer(input: &mut (impl Read + Seek), at: u64, length: u64) -> io::Result<Option<u64>> {
+    let mut reader = BufReader::new(input);
+    let mut here = reader.seek(SeekFrom::Start(at))?;
+    loop {
+        let mut head = [0; 9];
+        if length.saturating_sub(here) < head.len() as u64 {
+            return Ok(None);
+        }
+        reader.read_exact(&mut head)?;
+        let [opcode, content_len @ ..] = head;
+        let end = here
+            .checked_add(head.len() as u64)
+            .and_then(|content| content.checked_add(u64::from_le_bytes(content_len)));
+        let Some(end) = end.filter(|end| *end <= length) else {
+            return Ok(None);
+        };
+        here = reader.seek(SeekFrom::Start(end))?;
+        if opcode == op::FOOTER {
+            let mut magic = [0; MAGIC.len()];
+            let is_whole = length - here >= magic.len() as u64 && {
+                reader.read_exact(&mut magic)?;
+                magic == MAGIC
+            };
+            return Ok(is_whole.then(|| here + magic.len() as u64));
+        }
+    }
 }
 
 /// Where the chunk of this index stands.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import binascii
 import fcntl
+import json
 import os
 import re
 import stat
@@ -58,10 +59,31 @@ class Instance:
         """
         pid = self.holder("controller")
         if pid is None:
+            robot = self._offered_from()
+            if robot is not None:
+                raise NotRunning(
+                    f"{self.worm} is a worm of {robot}, which `wormd fleet` offers here, and a script reaches its own computer alone: "
+                    f"run it on {robot}; `wormd watch`, `dashboard` and `record` reach {self.worm} from here"
+                )
             raise NotRunning(
                 f"no worm {self.worm} is running: start it with `wormd up --name {self.worm}`; `wormd status` lists those that run"
             )
         return pid
+
+    def _offered_from(self) -> str | None:
+        """Return the robot whose worm a fleet process offers here under this name."""
+        holder = self.holder("relay")
+        for file in self.root.glob("fleet-*.json") if holder is not None else ():
+            try:
+                found = json.loads(file.read_text())
+                robots = found["robots"].items() if found["pid"] == holder else ()
+                # A worm that is not offered has the reason in place of nothing.
+                robot = next((robot for robot, it in robots if it["worms"].get(self.worm, "") is None), None)
+            except (OSError, ValueError, KeyError, TypeError, AttributeError):
+                continue  # Another process may just be writing it, or it is of another version.
+            if robot is not None:
+                return str(robot)
+        return None
 
 
 def locate(name: str | None, config: str | os.PathLike[str] | None) -> Instance:

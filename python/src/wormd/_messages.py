@@ -183,6 +183,9 @@ class CommandKind(Code):
     STALE = "stale", 11
     """Note that a command did not come this far, because it came too late: over the network, or to a relay that stood
     still. The sender is NAME: COMMAND. Moves and permits nothing."""
+    BUSY = "busy", 12
+    """Note that a command did not come this far, because too many wait for the controller, or too many watchers of a
+    laptop command over the network. The sender is NAME: COMMAND. Moves and permits nothing."""
 
 
 class CommandOutcome(Code):

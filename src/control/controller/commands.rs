@@ -95,9 +95,14 @@ impl Controller {
                 None => (CommandOutcome::BadPosition, 0),
             },
             // The record is all that they are for.
-            (CommandKind::TakeOver | CommandKind::NotDriver | CommandKind::NotPermitted | CommandKind::Stale, _) => {
-                ACCEPTED
-            }
+            (
+                CommandKind::TakeOver
+                | CommandKind::NotDriver
+                | CommandKind::NotPermitted
+                | CommandKind::Stale
+                | CommandKind::Busy,
+                _,
+            ) => ACCEPTED,
             _ => (CommandOutcome::WrongMode, 0),
         }
     }

@@ -37,6 +37,9 @@ coded_enum! {
         /// Note that a command did not come this far, because it came too late: over the network, or to a relay that stood still. The sender is
         /// `NAME: COMMAND`. Moves and permits nothing.
         Stale = 11 => "stale",
+        /// Note that a command did not come this far, because too many wait for the controller, or too many watchers of a laptop command over
+        /// the network. The sender is `NAME: COMMAND`. Moves and permits nothing.
+        Busy = 12 => "busy",
     }
 }
 
@@ -97,7 +100,13 @@ impl CommandKind {
     pub const fn is_remark(self) -> bool {
         matches!(
             self,
-            Self::Acknowledge | Self::Mark | Self::TakeOver | Self::NotDriver | Self::NotPermitted | Self::Stale
+            Self::Acknowledge
+                | Self::Mark
+                | Self::TakeOver
+                | Self::NotDriver
+                | Self::NotPermitted
+                | Self::Stale
+                | Self::Busy
         )
     }
 }

@@ -76,6 +76,25 @@ fn a_log_cut_anywhere_gives_all_whole_chunks() {
 }
 
 #[test]
+fn a_log_to_which_another_was_appended_says_where_it_ends() {
+    let (bytes, _) = small_log();
+    let read = |appended: &[u8]| {
+        let file = [&bytes, appended].concat();
+        messages_from(Cursor::new(file), "appended".as_ref()).expect("a log")
+    };
+    assert_eq!(read(&[]).warnings, Vec::<String>::new());
+    for appended in [&bytes[..], &bytes[..1000], b"\n"] {
+        let log = read(appended);
+        assert_eq!(log.states.len(), 40);
+        let whole = format!("ends at byte {} of {}", bytes.len(), bytes.len() + appended.len());
+        let said = log.warnings.iter().any(|warning| warning.contains(&whole));
+        assert!(said, "{} bytes appended: {:?}", appended.len(), log.warnings);
+        let remedy = format!("`tail -c +{}`", bytes.len() + 1);
+        assert!(log.warnings[0].contains(&remedy), "{:?}", log.warnings);
+    }
+}
+
+#[test]
 fn what_can_be_unpacked_of_the_last_chunk_is_taken() {
     let sink = Sink::default();
     let mut writer = Writer::new(sink.clone(), "large".as_ref(), &origin()).expect("memory takes all");
