@@ -455,7 +455,7 @@ fn payload_or_softer_pads() {
 #[test]
 fn nothing_is_allocated() {
     let (_, mut plant, mut sensing) = worm_of(1);
-    let samples: Vec<_> = (0..9_000).map(|_| plant.tick()).collect();
+    let samples: Vec<_> = (0..11_500).map(|_| plant.tick()).collect();
     let mut cycles = 0;
     let info = allocation_counter::measure(|| {
         for sample in &samples {
@@ -470,7 +470,7 @@ fn nothing_is_allocated() {
 fn bad_readings_do_no_harm() {
     let (drawn, mut plant, mut sensing) = worm_of(4);
     let mut tick = 0;
-    while plant.cycles() < 8 {
+    while plant.cycles() < 9 {
         let mut sample = plant.tick();
         tick += 1;
         match tick % 1013 {
