@@ -72,7 +72,7 @@ const RELAXING_REST_S: f64 = 3.0;
 const LONGEST_GAP_S: f64 = 0.1;
 /// Standard deviation of a voltage read in steps of 0.1 V, V, and of a current read in steps of 1 mA, A.
 const ROUNDING: [f64; 2] = [0.029, 0.29e-3];
-/// Cycles below which the fit may have begun at a wrong answer.
+/// Cycles below which the fit may still find a better answer.
 pub(crate) const WARM_CYCLES: f64 = 3.0;
 /// Gait-to-gait scatter of the advance, as a share of what compliance takes of the stroke.
 const ADVANCE_SCATTER_SHARE: f64 = 0.02;

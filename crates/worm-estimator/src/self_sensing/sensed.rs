@@ -1,6 +1,6 @@
 //! What self-sensing says after a cycle.
 
-use super::{Armed, Blind, Changes, ClosedCycle, CycleFigures, ROUNDING, SelfSensing, WARM_CYCLES};
+use super::{Armed, Blind, Changes, ClosedCycle, CycleFigures, ROUNDING, SelfSensing};
 use worm_physics::MAX_CELLS;
 
 /// Share of their friction that all cells have lost beyond which an advance is not known: it may be any part of the stroke, either way.
@@ -58,7 +58,7 @@ pub struct SelfSensed {
 /// How the newest cycle was taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Standing {
-    /// Fitted; but of so few cycles the intervals may be too narrow, and no change can be seen yet.
+    /// Fitted; but of so few cycles no change can be seen yet, and a better answer may still be found.
     WarmingUp,
     /// Fitted with those before.
     Fitted,
@@ -69,20 +69,9 @@ pub enum Standing {
 }
 
 impl SelfSensing {
-    /// By how much the first errors are larger than those of the fit: it may have begun at a wrong answer, and has hardly seen what scatters.
-    fn widened(&self) -> f64 {
-        let cycles = self.fit.cycles();
-        if (1.0..WARM_CYCLES).contains(&cycles) {
-            (1.0 + 1.0 / cycles).sqrt()
-        } else {
-            1.0
-        }
-    }
-
     /// Figures of the steady cycle with their standard errors.
     pub(super) fn figures(&self) -> Option<(CycleFigures, CycleFigures)> {
-        let (figures, sigma) = self.fit.figures().copied()?;
-        let mut sigma = CycleFigures::from_flat(&sigma.flat().map(|sigma| self.widened() * sigma));
+        let (figures, mut sigma) = self.fit.figures().copied()?;
         let changes = self.detector.changes();
         let slips = changes.all_friction_lost && changes.loss_share > SLIPPING_LOSS;
         if slips || changes.jammed != 0 {
@@ -109,8 +98,7 @@ impl SelfSensing {
         };
         let (parameters, covariance) = (self.fit.parameters(), self.fit.covariance());
         let cells = parameters.cells;
-        let widened = self.widened();
-        let sigma = |unknown: usize| widened * covariance[(unknown, unknown)].max(0.0).sqrt();
+        let sigma = |unknown: usize| covariance[(unknown, unknown)].max(0.0).sqrt();
         let of_cells = |of: &dyn Fn(usize) -> f64| {
             let mut values = [0.0; MAX_CELLS];
             (0..cells).for_each(|cell| values[cell] = of(cell));

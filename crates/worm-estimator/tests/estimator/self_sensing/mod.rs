@@ -8,7 +8,7 @@ mod pitch;
 mod plant;
 
 use plant::{Drawn, Plant};
-use worm_estimator::self_sensing::{Changes, MotorSample, SelfSensed, SelfSensing};
+use worm_estimator::self_sensing::{Changes, MotorSample, SelfSensed, SelfSensing, Standing};
 use worm_physics::{Ledger, Worm, steady_cycle};
 
 /// Seeds of the worms: `few` from 1 on, or as many as `WORMD_SEEDS` says from `WORMD_FIRST_SEED` on.
@@ -274,23 +274,36 @@ fn a_changed_worm_is_reported() {
     let count = (seeds.end - seeds.start) as f64;
     let sliding = |worm: &Worm| worm.check_hold().is_err() || steady_cycle(worm).cycle().is_none();
     let mut nearly_all_can = 0.0;
-    let [mut loss, mut rise] = [Errors::default(), Errors::default()];
+    let [mut loss, mut rise, mut friction] = std::array::from_fn(|_| Errors::default());
     let mut of_all = [[0; 4]; ALL_TO.len()];
     for seed in seeds.clone() {
         let (drawn, plant, mut sensing) = worm_of(seed);
         let cell = any_cell(&drawn);
         let mut usual = plant;
-        crawl(&mut usual, &mut sensing, 10, |_, sensed| {
+        // The first two are not fitted.
+        crawl(&mut usual, &mut sensing, 11, |_, sensed| {
             assert!(!sensed.changes.any(), "seed {seed}")
         });
-        let try_out = |worm: Worm| {
+        let try_out = |worm: Worm, mut friction: Option<&mut Errors>| {
             let (mut plant, mut sensing) = (usual.clone(), sensing.clone());
-            plant.change(worm);
-            reported(&mut plant, &mut sensing, 3).map(|(_, changes)| changes)
+            plant.change(worm.clone());
+            let found = reported(&mut plant, &mut sensing, 3);
+            for (cell, contact) in worm.contacts().iter().enumerate() {
+                let sensed = sensing.sensed().filter(|sensed| sensed.standing == Standing::Changed);
+                if let (Some(errors), Some(sensed)) = (&mut friction, sensed) {
+                    let truth_n = contact.stiffness_n_per_m * contact.forward_bound_m;
+                    errors.add(
+                        sensed.friction_n[cell] - truth_n,
+                        truth_n,
+                        sensed.friction_sigma_n[cell],
+                    );
+                }
+            }
+            found.map(|(_, changes)| changes)
         };
         let mut wet = drawn.worm.clone();
         wet.scale_friction(Some(cell), 0.7);
-        if let Some(changes) = try_out(wet) {
+        if let Some(changes) = try_out(wet, Some(&mut friction)) {
             if changes.friction_lost == 1 << cell {
                 loss.add(changes.loss_share - 0.3, 0.3, changes.loss_sigma);
             }
@@ -301,14 +314,14 @@ fn a_changed_worm_is_reported() {
         wet.scale_friction(Some(cell), 0.3);
         if !sliding(&wet) {
             nearly_all_can += 1.0;
-            nearly_all_lost += u32::from(try_out(wet).is_some_and(|changes| changes.friction_lost == 1 << cell));
+            nearly_all_lost += u32::from(try_out(wet, None).is_some_and(|changes| changes.friction_lost == 1 << cell));
         }
         for (factor, [can, lost, all, loaded]) in ALL_TO.into_iter().zip(&mut of_all) {
             let mut wet = drawn.worm.clone();
             wet.scale_friction(None, factor);
             if !sliding(&wet) {
                 *can += 1;
-                let changes = try_out(wet).unwrap_or_default();
+                let changes = try_out(wet, None).unwrap_or_default();
                 *lost += u32::from(changes.friction_lost != 0);
                 *all += u32::from(changes.all_friction_lost);
                 *loaded += u32::from(changes.friction_lost == 0 && changes.any());
@@ -322,14 +335,14 @@ fn a_changed_worm_is_reported() {
             .clone()
             .with_stroke_scale(cell, 0.0)
             .expect("a stroke in range");
-        jammed += u32::from(try_out(stuck).is_some_and(|changes| changes.jammed == 1 << cell));
+        jammed += u32::from(try_out(stuck, None).is_some_and(|changes| changes.jammed == 1 << cell));
         let dragged = drawn
             .worm
             .clone()
             .with_resisting_force_n(0.8)
             .expect("a force in range");
         if !sliding(&dragged) {
-            let changes = try_out(dragged).unwrap_or_default();
+            let changes = try_out(dragged, None).unwrap_or_default();
             loaded += u32::from(changes.any());
             if changes.more_load {
                 rise.add(changes.load_rise_n - 0.8, 0.8, changes.load_rise_sigma_n);
@@ -338,7 +351,7 @@ fn a_changed_worm_is_reported() {
     }
     let percent = |part: u32, of: f64| 100.0 * f64::from(part) / of;
     println!(
-        "{count} worms from seed {}, a change after ten cycles, reported within three",
+        "{count} worms from seed {}, a change after nine cycles that were fitted, reported within three",
         seeds.start
     );
     println!(
@@ -364,8 +377,10 @@ fn a_changed_worm_is_reported() {
         percent(loaded, count)
     );
     loss.line("share lost, %", 100.0);
+    friction.line("friction of all cells then, %", 100.0);
     rise.line("rise of the load, %", 100.0);
     assert!(percent(right_cell, count) > 80.0 && percent(jammed, count) > 80.0);
+    assert!(friction.coverage() > 0.75);
     assert!(of_all.iter().all(|[can, _, all, _]| 10 * all >= 9 * can), "{of_all:?}");
 }
 
