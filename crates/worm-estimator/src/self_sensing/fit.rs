@@ -26,7 +26,7 @@ use super::leading;
 use super::model::{CycleFigures, CycleModel, FIGURES};
 use super::parameters::{MAX_UNKNOWNS, Matrix, Parameters, Vector};
 use super::pitch::MeasuredPull;
-use super::profile::{BINS_PER_STEP, MAX_BINS};
+use super::profile::{BINS_PER_STEP, MAX_BINS, Profile};
 use before::Before;
 use linearise::{Linearisation, dot};
 use std::f64::consts::{PI, TAU};
@@ -73,8 +73,7 @@ pub(super) struct Fit {
     ripples: Box<Ripples>,
     ripple_count: usize,
     gear: GearModel,
-    velocity_rad_per_s: f64,
-    bins_per_s: f64,
+    velocity_rad_per_s: f64, // of the cam, in the mean over the cycles
     stroke_m: f64,
     force_per_torque: f64, // of the stepping cell, 1/m
     prior: Vector,
@@ -155,7 +154,6 @@ impl Fit {
             ripple_count,
             gear: *gear,
             velocity_rad_per_s: TAU / config.cycle_s,
-            bins_per_s: bins as f64 / config.cycle_s,
             stroke_m: worm.stroke_m(),
             force_per_torque: TAU / (cells as f64 * worm.stroke_m()),
             prior: at.values,
@@ -202,13 +200,15 @@ impl Fit {
         self.measured.forget();
     }
 
-    /// Takes a cycle's profile, and the variance of its means by the noise within bins; where the slope was measured, the pull that follows
-    /// from it, with its standard deviation, N. [`step`](Self::step) fits it.
-    pub(super) fn take(&mut self, torque_n_m: &[f64], variance: f64, pull_n: Option<(f64, f64)>) {
+    /// Takes a cycle's profile; where the slope was measured, the pull that follows from it, with its standard deviation, N.
+    /// [`step`](Self::step) fits it.
+    pub(super) fn take(&mut self, profile: &Profile, pull_n: Option<(f64, f64)>) {
+        let torque_n_m = profile.torque_n_m();
         self.cycles = self.forgetting * self.cycles + 1.0;
         self.squared_cycles = self.forgetting * self.forgetting * self.squared_cycles + 1.0;
         let share = 1.0 / self.cycles;
-        self.variance += share * (variance + FLOOR_N_M * FLOOR_N_M - self.variance);
+        self.variance += share * (profile.variance() + FLOOR_N_M * FLOOR_N_M - self.variance);
+        self.velocity_rad_per_s += share * (profile.velocity_rad_per_s() - self.velocity_rad_per_s);
         for (mean, torque) in self.mean_n_m.iter_mut().zip(torque_n_m) {
             *mean += share * (torque - *mean);
         }
@@ -291,13 +291,17 @@ impl Fit {
         plain[..bins.len()].copy_from_slice(bins);
         for (bin, torque_n_m) in bins.iter_mut().enumerate() {
             let worm_n_m = plain[bin];
-            let led_n_m = worm_n_m + values[gears + 3] * self.bins_per_s * rise(&plain, bin);
+            let led_n_m = worm_n_m + values[gears + 3] * self.bins_per_s() * rise(&plain, bin);
             *torque_n_m = gain * led_n_m + offset + load * self.load_on_gears_n_m(worm_n_m);
             for (ripple, means) in self.ripples[..self.ripple_count].iter().enumerate() {
                 let (sine, cosine) = means[bin];
                 *torque_n_m += values[gears + 4 + 2 * ripple] * sine + values[gears + 5 + 2 * ripple] * cosine;
             }
         }
+    }
+
+    fn bins_per_s(&self) -> f64 {
+        self.bins as f64 * self.velocity_rad_per_s / TAU
     }
 
     /// Torque that presses the gears' teeth together while the cam takes `cam_n_m`, without its sign, N m.

@@ -380,7 +380,7 @@ impl SelfSensing {
             return true;
         }
         let Some(cycle) = self.waiting.take() else { return false };
-        let (torque_n_m, variance) = (self.profile.torque_n_m(), self.profile.variance());
+        let torque_n_m = self.profile.torque_n_m();
         let seen = if self.detector.is_another() && self.fit.is_as_before(torque_n_m) {
             self.detector.see_one_as_before()
         } else {
@@ -420,7 +420,7 @@ impl SelfSensing {
             let sigma_n = self.pitch_sensor.pull_sigma_n(self.weight_n, sine);
             (self.weight_n * sine, sigma_n)
         });
-        self.fit.take(torque_n_m, variance, pull_n);
+        self.fit.take(&self.profile, pull_n);
         self.fitting = Some(cycle);
         false
     }

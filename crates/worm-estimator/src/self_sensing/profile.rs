@@ -39,6 +39,8 @@ pub(super) struct Profile {
     bin: Box<[Bin; MAX_BINS]>,
     torque_n_m: Box<[f64; MAX_BINS]>,
     variance: f64,
+    swept: f64, // velocity over the phase of the open cycle, rad/s × cycles
+    velocity_rad_per_s: f64,
 }
 
 impl Profile {
@@ -48,16 +50,20 @@ impl Profile {
             bin: Box::new([Bin::default(); MAX_BINS]),
             torque_n_m: Box::new([0.0; MAX_BINS]),
             variance: 0.0,
+            swept: 0.0,
+            velocity_rad_per_s: 0.0,
         }
     }
 
     pub(super) fn clear(&mut self) {
         self.bin.fill(Bin::default());
+        self.swept = 0.0;
     }
 
     /// Adds a reading in the middle of a stretch of `turned` cycles; `fraction` is the phase within the cycle, 0 to 1.
     #[inline]
     pub(super) fn add(&mut self, fraction: f64, turned: f64, torque_n_m: f64, velocity_rad_per_s: f64) {
+        self.swept += turned * velocity_rad_per_s;
         let place = fraction * self.bins as f64;
         let at = (place as usize).min(self.bins - 1);
         let bin = &mut self.bin[at];
@@ -97,6 +103,8 @@ impl Profile {
             counted += 1.0;
         }
         self.variance = variance / counted;
+        let turned: f64 = self.bin[..self.bins].iter().map(|bin| bin.turned).sum();
+        self.velocity_rad_per_s = self.swept / turned;
         true
     }
 
@@ -145,6 +153,11 @@ impl Profile {
         &self.torque_n_m[..self.bins]
     }
 
+    /// Mean velocity of the cam over the phase of the closed cycle, rad/s.
+    pub(super) fn velocity_rad_per_s(&self) -> f64 {
+        self.velocity_rad_per_s
+    }
+
     /// Variance of such a mean by the scatter of the readings within bins, N² m².
     pub(super) fn variance(&self) -> f64 {
         self.variance
@@ -175,6 +188,8 @@ mod tests {
         let furthest = off.into_iter().fold(0.0, f64::max);
         // Of 0.5 mN m: most is left where a bin has its edge at a gap, or at the end of the cycle.
         assert!(mean < 2e-5 && furthest < 1.5e-4, "{mean}, {furthest}");
+        let velocity = profile.velocity_rad_per_s();
+        assert!((velocity / 2.5 - 1.0).abs() < 0.01, "{velocity} rad/s");
         profile.clear();
         assert!(!profile.close(1e-3));
     }

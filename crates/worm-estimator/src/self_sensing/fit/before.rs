@@ -18,6 +18,7 @@ pub(super) struct Before {
     mean_n_m: Box<[f64; MAX_BINS]>,
     cycles: f64,
     squared_cycles: f64,
+    velocity_rad_per_s: f64,
     measured: MeasuredPull,
     squared_distance: f64, // of the cycle that showed the change, weighted, N² m²
 }
@@ -30,6 +31,7 @@ impl Before {
             mean_n_m: Box::new([0.0; MAX_BINS]),
             cycles: 0.0,
             squared_cycles: 0.0,
+            velocity_rad_per_s: 0.0,
             measured: MeasuredPull::default(),
             squared_distance: 0.0,
         }
@@ -42,6 +44,7 @@ impl Fit {
         let before = &mut self.before;
         (before.at, before.other, before.measured) = (self.at, self.other, self.measured);
         (before.cycles, before.squared_cycles) = (self.cycles, self.squared_cycles);
+        before.velocity_rad_per_s = self.velocity_rad_per_s;
         *before.mean_n_m = *self.mean_n_m;
         self.before.squared_distance = self.squared_distance(torque_n_m);
         self.free_common_friction();
@@ -62,6 +65,7 @@ impl Fit {
         let before = &self.before;
         (self.at, self.other, self.measured) = (before.at, before.other, before.measured);
         (self.cycles, self.squared_cycles) = (before.cycles, before.squared_cycles);
+        self.velocity_rad_per_s = before.velocity_rad_per_s;
         *self.mean_n_m = *before.mean_n_m;
         (self.first_answer, self.common_freedom) = (None, 0.0);
     }

@@ -118,7 +118,7 @@ impl Fit {
                 0 => 1.0,
                 1 => plain[bin],
                 2 => self.load_on_gears_n_m(plain[bin]),
-                3 => gain * self.bins_per_s * rise(&plain[..], bin),
+                3 => gain * self.bins_per_s() * rise(&plain[..], bin),
                 of_ripple => {
                     let (sine, cosine) = self.ripples[(of_ripple - 4) / 2][bin];
                     if of_ripple % 2 == 0 { sine } else { cosine }

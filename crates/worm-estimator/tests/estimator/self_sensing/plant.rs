@@ -19,7 +19,11 @@ const COUNT_RAD: f64 = TAU / 4096.0;
 const VELOCITY_COUNT: f64 = 0.229 * TAU / 60.0;
 /// The servo's own loop: duty per velocity error, and per time and velocity error.
 const LOOP: [f64; 2] = [0.066, 11.5];
-const CYCLE_S: f64 = 2.5;
+
+/// A number in a variable of the environment.
+fn from_environment(name: &str) -> Option<f64> {
+    std::env::var(name).ok()?.parse().ok()
+}
 
 /// What a drawn worm is.
 #[derive(Debug, Clone)]
@@ -37,6 +41,8 @@ pub struct Drawn {
     scatter: f64,
     damping_ratio: f64,
     noise_a: f64,
+    /// Time of a gait cycle, s, and what the estimator is told of it.
+    cycle_s: [f64; 2],
     pitch: Option<Pitch>,
 }
 
@@ -129,6 +135,7 @@ impl Drawn {
             scatter: rng.random_range(0.002..0.02),
             damping_ratio: rng.random_range(0.2..0.7),
             noise_a: rng.random_range(0.5e-3..3e-3),
+            cycle_s: ["WORMD_CYCLE_S", "WORMD_TOLD_CYCLE_S"].map(|name| from_environment(name).unwrap_or(2.5)),
             pitch: None,
         }
     }
@@ -144,20 +151,26 @@ impl Drawn {
         self
     }
 
+    /// The same worm with another gait: time of a cycle, s, and what the estimator is told of that.
+    pub fn with_cycle_s(mut self, crawled_s: f64, told_s: f64) -> Self {
+        self.cycle_s = [crawled_s, told_s];
+        self
+    }
+
     /// What the estimator is told. With `WORMD_CALIBRATED` set to a standard deviation, N m: after the cold gears of this worm were calibrated lifted, by
     /// a torque constant that is as wrong as before.
     pub fn config(&self) -> SelfSensingConfig {
         let mut gear = self.told_gear;
-        if let Some(sigma_n_m) = std::env::var("WORMD_CALIBRATED")
-            .ok()
-            .and_then(|text| text.parse().ok())
-        {
+        if let Some(sigma_n_m) = from_environment("WORMD_CALIBRATED") {
             let by_constant = gear.torque_constant_n_m_per_a / self.gear.torque_constant_n_m_per_a;
             gear.dry_n_m = self.gear.dry_n_m * by_constant;
             gear.viscous_n_m_s_per_rad = self.gear.viscous_n_m_s_per_rad * by_constant;
             gear.friction_sigma_n_m = sigma_n_m;
         }
-        SelfSensingConfig::new(gear)
+        SelfSensingConfig {
+            cycle_s: self.cycle_s[1],
+            ..SelfSensingConfig::new(gear)
+        }
     }
 
     pub fn slope_deg(&self) -> f64 {
@@ -287,7 +300,7 @@ impl Plant {
 
     fn step(&mut self) {
         let (gear, warmth_k) = (self.drawn.gear, self.warmth_k());
-        let goal = TAU / CYCLE_S * (self.time_s / 0.25).min(1.0);
+        let goal = TAU / self.drawn.cycle_s[0] * (self.time_s / 0.25).min(1.0);
         let bus_v = self.bus_v();
         let constant = gear.torque_constant_n_m_per_a * (1.0 - 0.001 * warmth_k);
         let winding_ohm = self.drawn.winding_ohm * (1.0 + 0.00393 * (warmth_k + 4.0));
