@@ -240,7 +240,7 @@ export function drawTrip({ frame }, driver) {
 export function drawInferred({ frame }) {
   const { inferred } = frame;
   if (!inferred || inferred.advance_m === null) {
-    fillValues(byId("inferred"), [["state", inferred ? "warming up: after two gait cycles" : "self-sensing is off"]]);
+    fillValues(byId("inferred"), [["state", inferred ? "warming up: after three gait cycles" : "self-sensing is off"]]);
     return;
   }
   const degrees = (...angles_rad) => `${angles_rad.map((angle_rad) => number((angle_rad * 180) / Math.PI, 1)).join(" ± ")}°`;
