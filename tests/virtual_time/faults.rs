@@ -278,7 +278,7 @@ slope, fault: alarms and how long after it they came, how it ended
  0° slide:speed=0.003          no-progress 1.73 s, sliding-down 3.27 s, holding
 30° slide:speed=0.01           sliding-down 0.38 s, no-progress 0.40 s, holding
 30° slope:deg=70               no-progress 1.02 s, holding
- 0° friction-inside:scale=3    energy-over-budget 3.84 s, more-load 4.04 s, crawling
+ 0° friction-inside:scale=3    energy-over-budget 3.84 s, more-load 4.00 s, crawling
  0° battery:charge=0.08@0      battery-low 13.31 s, crawling
  0° sag:volts=1.4              device-fault 0.26 s, fault (under-voltage)
  0° silence:device=servo       link-fault 0.10 s, tracker-fault 0.67 s, fault (link-lost)

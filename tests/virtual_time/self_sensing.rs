@@ -70,7 +70,7 @@ fn no_tick_of_a_slow_cycle_loses_its_electrical_energy() {
         let worm = Worm::try_from(&config).expect("the worm of the paper");
         let mut sensing = SelfSensing::new(&worm, &config.self_sensing());
         let mut session = crawling(&config, wired(&config, &Options::default()), 1000.0);
-        session.run_s(3.5 * cycle_s, |tick| {
+        session.run_s(4.5 * cycle_s, |tick| {
             if tick.state.motor_is_new == 1 {
                 sensing.update(&MotorSample::from(&tick.state));
             }

@@ -24,7 +24,7 @@ fn with_fault(toml: &str, fault: &str) -> Session<Wired> {
 
 const STORIES: &str = "\
 stall                      motor-stall 0.03 s, fault (alarm)
-friction-inside:scale=3    energy-over-budget 3.84 s, more-load 4.04 s, crawling
+friction-inside:scale=3    energy-over-budget 3.84 s, more-load 4.00 s, crawling
 sag:volts=1.4              device-fault 0.26 s, fault (under-voltage)
 silence:device=servo       link-fault 0.10 s, fault (link-lost)
 overheat:ambient=90        device-fault 0.98 s, fault (over-temperature)
