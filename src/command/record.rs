@@ -26,7 +26,7 @@ pub struct RecordArgs {
     out: Option<PathBuf>,
     /// Instead of a log: the moments around each alarm and fault, as files in this folder, and a thin log of the rest. Without DIR, in
     /// `black_box.folder` of the configuration
-    #[arg(long, value_name = "DIR", num_args = 0..=1, conflicts_with_all = ["out", "force", "duration", "topics", "max_size", "max_age", "keep", "max_total", "no_index"])]
+    #[arg(long, value_name = "DIR", num_args = 0..=1, conflicts_with_all = ["out", "force", "duration", "topics", "max_size", "max_age", "keep", "max_total", "no_index", "rate"])]
     black_box: Option<Option<PathBuf>>,
     #[command(flatten)]
     limits: RecordingLimits,
@@ -84,6 +84,11 @@ pub fn run(args: &RecordArgs) -> Result<(), Failure> {
         return run_black_box(args, &config, text, &end, &rounds);
     };
     if let Some(worm) = elsewhere {
+        if options.rate_hz.is_some() {
+            return Err(Failure::unusable(
+                "20 ticks a second come over a network whatever is asked for: leave --rate out, or record on the robot",
+            ));
+        }
         return run_over_network(args, worm, text, (out, options), &end, &rounds);
     }
     let mut recorder = Recorder::open(&config, text, &args.topics, out, args.force, options)?;

@@ -32,6 +32,16 @@ pub struct RecordingLimits {
     /// until `wormd export --mcap` has added it
     #[arg(long)]
     no_index: bool,
+    /// Only so many ticks and estimates a second, such as 100, and all in which something changes; of everything else all. Such a log
+    /// cannot be replayed to the same results
+    #[arg(long, value_name = "HZ", value_parser = rate, allow_negative_numbers = true)]
+    rate: Option<f64>,
+}
+
+/// Ticks a second, of those that there are.
+fn rate(text: &str) -> Result<f64, String> {
+    let rate_hz = text.parse().ok().filter(|rate_hz| (0.1..=1000.0).contains(rate_hz));
+    rate_hz.ok_or_else(|| format!("'{text}' is no rate: give 0.1 to 1000 ticks a second"))
 }
 
 impl RecordingLimits {
@@ -48,6 +58,7 @@ impl RecordingLimits {
             max_age: self.max_age.as_ref().map(|age| age.time),
             keep: self.keep.map(|keep| keep as usize),
             index: if self.no_index { Index::None } else { Index::Messages },
+            rate_hz: self.rate,
         };
         if let Some(total) = &self.max_total {
             let part = total.bytes / FILES_IN_QUOTA;
@@ -71,15 +82,18 @@ impl RecordingLimits {
             && self.keep.is_none()
             && self.max_total.is_none()
             && !self.no_index
+            && self.rate.is_none()
     }
 
     /// The same as arguments for another process.
     pub(crate) fn forward(&self) -> Vec<OsString> {
         let keep = self.keep.map(|keep| keep.to_string());
+        let rate = self.rate.map(|rate| rate.to_string());
         let arguments = [
             ("--max-size", self.max_size.as_ref().map(|size| &size.text)),
             ("--max-age", self.max_age.as_ref().map(|age| &age.text)),
             ("--keep", keep.as_ref()),
+            ("--rate", rate.as_ref()),
             ("--max-total", self.max_total.as_ref().map(|size| &size.text)),
         ];
         let given = arguments.into_iter().filter_map(|(flag, value)| Some([flag, value?]));

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 use worm_log::{Channel, Index, Logged, Note, WriteError, Writer};
 
 /// What the files of a recording are like. By default there is one file, of any size, with an index.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct FileOptions {
     /// A file that has so many bytes is followed by the next.
     pub max_bytes: Option<u64>,
@@ -26,6 +26,8 @@ pub(crate) struct FileOptions {
     pub keep: Option<usize>,
     /// Whether each file gets an index of its messages.
     pub index: Index,
+    /// How many ticks and estimates a second go into them; all where there is none.
+    pub rate_hz: Option<f64>,
 }
 
 impl FileOptions {

@@ -38,7 +38,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use worm_estimator::config::Config;
 use worm_estimator::message::{RecordingProblem, State};
-use worm_log::{Channel, Origin};
+use worm_log::{Channel, Note, Origin};
 
 /// How often the topics are emptied. At 1 kHz even the fullest holds a second.
 pub(crate) const POLL_INTERVAL: Duration = Duration::from_millis(20);
@@ -82,6 +82,7 @@ pub(crate) struct Recorder {
     topics: RecordedTopics,
     hub: Hub,
     writer: LogWriter,
+    thinner: Option<Thinner>,
     progress: Arc<Progress>,
     configuration: CarriedConfiguration,
     /// Results that were over before this time are of another run, ns of `CLOCK_MONOTONIC`.
@@ -133,6 +134,11 @@ impl Recorder {
         if let Some(finding) = configuration.look(false) {
             head.take_in(&finding);
         }
+        if let Some(rate_hz) = options.rate_hz {
+            head.notes.push(Note::of(format!(
+                "only {rate_hz} ticks and estimates a second were recorded (--rate): a replay cannot come to the same results"
+            )));
+        }
         take_full_files_as_errors()?;
         let hub = Hub::open(&instance).map_err(Failure::failed)?;
         let topics = RecordedTopics::open(&hub, topics)?;
@@ -143,6 +149,7 @@ impl Recorder {
             topics,
             hub,
             writer,
+            thinner: options.rate_hz.map(Thinner::new),
             progress,
             configuration,
             results_from_ns: begun_ns,
@@ -171,8 +178,12 @@ impl Recorder {
             if let Some(finding) = self.configuration.look(true) {
                 self.writer.write_finding(finding)?;
             }
+            let batch = match &mut self.thinner {
+                Some(thinner) => thinner.thin(&batch),
+                None => batch,
+            };
+            self.messages += batch.len() as u64;
             self.writer.write(batch)?;
-            self.messages += polled.messages as u64;
         }
         self.writer.check()?;
         self.status.report(&self.hub, self.figures());

@@ -110,6 +110,46 @@ fn the_main_job_records_what_replays_to_the_same_results() {
 }
 
 #[test]
+fn a_thinned_recording_has_few_ticks_and_every_cycle() {
+    let worm = Worm::new("thin");
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, file) = path_in(&folder);
+    let config = worm.config(FAST);
+    let up = [
+        "up",
+        "--json",
+        "--duration",
+        "8",
+        "--config",
+        &config,
+        "--record",
+        &file,
+        "--rate",
+        "50",
+    ];
+    let output = worm.wormd(&up).output();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{}\n{error}", output.status);
+    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a summary");
+    let log = messages(&path).expect("a log");
+    assert!(
+        log.warnings.iter().any(|note| note.contains("only 50 ticks")),
+        "{:?}",
+        log.warnings
+    );
+    assert_eq!(Some(log.cycles.len()), summary["cycles"].as_array().map(Vec::len));
+    let span_s = log.states.last().map_or(0, |last| last.time_ns - log.states[0].time_ns) as f64 * 1e-9;
+    let rates = [log.states.len(), log.estimates.len()].map(|count| count as f64 / span_s);
+    // A tick in which something changes comes besides; an estimate waits for a sample of the tracker.
+    assert!(
+        rates.iter().all(|rate| (30.0..55.0).contains(rate)),
+        "{rates:?} a second"
+    );
+    let too_fast = worm.wormd(&["record", "--out", &file, "--rate", "2000"]).output();
+    assert_eq!(too_fast.status.code(), Some(2));
+}
+
+#[test]
 fn a_recorder_goes_on_while_others_are_started_anew_and_loses_little_when_it_is_killed() {
     let worm = Worm::new("recorder");
     let folder = tempfile::tempdir().expect("a folder");
