@@ -170,6 +170,7 @@ mod tests {
                 keep: None,
                 max_total: Some(Size::parse(text).expect("a size")),
                 no_index: false,
+                rate: None,
             };
             limits.file_options()
         };

@@ -154,25 +154,59 @@ proptest::proptest! {
     }
 }
 
-#[test]
-fn frames_that_a_network_lost_are_not_laid_to_the_screen() {
-    let network = Network {
+fn network(frames_lost: u64) -> Network {
+    Network {
         robot: "robot1".to_owned(),
         may_drive: true,
-        frames_lost: 3,
+        frames_lost,
         round_trip_ms: Some(20),
         boot_id: String::new(),
         synchronised: None,
         wall_offset_ns: 0,
-    };
+    }
+}
+
+#[test]
+fn frames_that_a_network_lost_are_not_laid_to_the_screen() {
     for (network, words) in [
         (None, "3 frames were left out: this screen did not take them"),
-        (Some(network), "3 frames were lost on the way"),
+        (Some(network(3)), "3 frames were lost on the way"),
     ] {
         let mut app = screen_over(network, Seat::Watch, &received(3.4), None);
         app.take(Line::Lost { frames: 3 }, NOW_NS);
         assert!(app.take_log().any(|line| line.starts_with(words)), "{words}");
     }
+}
+
+/// As after a fleet process that was suspended: what it held comes first when it goes on.
+#[test]
+fn a_frame_that_waited_on_the_way_is_not_compared_with_the_ghost() {
+    const MS: u64 = 1_000_000;
+    let telemetry = received(3.4);
+    let mut app = screen_over(Some(network(0)), Seat::Watch, &telemetry, None);
+    let began_ns = telemetry.state.expect("a state").time_ns;
+    let mut scores = |made_ms: u64, comes_ms: u64| {
+        let time_ns = began_ns + made_ms * MS;
+        let mut worm = RelayedWorm::new(Subject::of(&Config::default()));
+        worm.telemetry = telemetry.clone();
+        let (state, estimate) = (
+            telemetry.state.expect("a state"),
+            telemetry.estimate.expect("an estimate"),
+        );
+        worm.telemetry.take_state(&State { time_ns, ..state });
+        worm.telemetry.take_estimate(&Estimate { time_ns, ..estimate });
+        let mut frame = worm.frame(2, time_ns, Seen::default(), 1, None);
+        frame.network = Some(network(0));
+        app.take(Line::Frame(Box::new(frame)), NOW_NS + comes_ms * MS);
+        app.take_log().filter(|line| line.contains("from its ghost")).count()
+    };
+    assert_eq!([scores(50, 60), scores(100, 115)], [0, 0], "there was no silence");
+    assert_eq!(scores(150, 10_160), 0, "it was made ten seconds ago");
+    assert_eq!(
+        scores(10_200, 10_220),
+        1,
+        "the worm as it is now, after ten seconds of silence"
+    );
 }
 
 /// Each page has what it is for, in the usual terminal and in a large one.
