@@ -12,36 +12,32 @@ use worm_estimator::config::Config;
 
 /// Where boxes are looked for.
 #[derive(Debug, Clone)]
-pub(crate) enum Place {
-    /// In this folder, whatever else there is.
-    Given(Folder),
-    /// Where this worm's black box wrote last.
-    Newest {
-        /// The folder of the configuration, or where the installed service keeps it.
-        configured: Folder,
-        /// Where it is remembered which folder another one was; none for a user without a home.
-        memory: Option<PathBuf>,
-    },
+pub(crate) struct Place {
+    /// The folder that was given, or that of the configuration, or where the installed service keeps it.
+    usual: Folder,
+    /// Where it is remembered which folder another one was; none where one was given, and for a user without a home.
+    memory: Option<PathBuf>,
 }
 
 impl Place {
-    /// That of the configured worm.
-    pub(crate) fn of(config: &Config) -> Self {
-        Self::Newest {
-            configured: Folder::configured(config),
-            memory: memory(&config.worm.name),
+    /// That of a worm; a folder that is given counts alone.
+    pub(crate) fn of(config: &Config, given: Option<&Path>) -> Self {
+        match given {
+            Some(path) => Self {
+                usual: Folder::new(path),
+                memory: None,
+            },
+            None => Self {
+                usual: Folder::configured(config),
+                memory: memory(&config.worm.name),
+            },
         }
     }
 
-    /// The folder: that of the configuration, unless this user's black box of the worm began elsewhere after everything there.
+    /// The folder: the usual one, unless this user's black box of the worm began elsewhere after everything there.
     pub(crate) fn folder(&self) -> Folder {
-        match self {
-            Self::Given(folder) => folder.clone(),
-            Self::Newest { configured, memory } => {
-                let remembered = memory.as_ref().and_then(|memory| recall(memory, configured));
-                remembered.unwrap_or_else(|| configured.clone())
-            }
-        }
+        let remembered = self.memory.as_ref().and_then(|memory| recall(memory, &self.usual));
+        remembered.unwrap_or_else(|| self.usual.clone())
     }
 }
 
@@ -66,12 +62,12 @@ fn note(memory: &Path, folder: &Path) -> io::Result<()> {
     fs::rename(&draft, memory)
 }
 
-/// The folder that was noted, where it is there and was begun with later than anything in the configured one.
-fn recall(memory: &Path, configured: &Folder) -> Option<Folder> {
+/// The folder that was noted, where it is there and was begun with later than anything in the usual one.
+fn recall(memory: &Path, usual: &Folder) -> Option<Folder> {
     let begun = fs::metadata(memory).and_then(|about| about.modified()).ok()?;
     let noted = fs::read_to_string(memory).ok()?;
     let path = Path::new(&noted);
-    let is_newer = newest_change(configured.path()).is_none_or(|changed| changed < begun);
+    let is_newer = newest_change(usual.path()).is_none_or(|changed| changed < begun);
     (is_newer && path.is_dir()).then(|| Folder::new(path))
 }
 
@@ -102,8 +98,8 @@ mod tests {
         let home = tempfile::tempdir().expect("a folder");
         let [configured, elsewhere] = ["configured", "elsewhere"].map(|name| home.path().join(name));
         let memory = home.path().join("state/w.black-box");
-        let place = Place::Newest {
-            configured: Folder::new(&configured),
+        let place = Place {
+            usual: Folder::new(&configured),
             memory: Some(memory.clone()),
         };
         let meant = || place.folder().path().to_owned();

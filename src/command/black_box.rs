@@ -105,7 +105,7 @@ impl PlaceArgs {
             return Ok(Folder::new(folder));
         }
         let config = self.worm.load()?;
-        let folder = Place::of(&config).folder();
+        let folder = Place::of(&config, None).folder();
         if folder.path() != Folder::configured(&config).path() {
             let (worm, path) = (&config.worm.name, folder.path().display());
             log_line(format_args!(

@@ -90,12 +90,8 @@ fn serve(args: &DashboardArgs, config: worm_estimator::config::Config, instance:
     print::announce(text);
     let mut hosts = args.host.clone();
     hosts.extend(own_names());
-    let boxes = match &args.black_box {
-        Some(folder) => Place::Given(Folder::new(folder)),
-        None => Place::of(&config),
-    };
     let settings = Settings {
-        boxes,
+        boxes: Place::of(&config, args.black_box.as_deref()),
         config,
         instance: instance.clone(),
         arguments: args.worm.forward(),

@@ -42,8 +42,9 @@ const FLOOR_N_M: f64 = 3e-4;
 /// Weight of the bins on either side of the jump from one step to the next: readings are a tick apart, the jump is not.
 const FIRST_BIN_WEIGHTS: [f64; 2] = [0.01, 0.3];
 const LAST_BIN_WEIGHT: f64 = 0.02;
-/// Standard deviation of the mean ln friction of all cells of a worm that has changed.
-const COMMON_FRICTION_SIGMA: f64 = 1.0;
+/// Standard deviation of the mean ln friction of all cells, which lie in one canal: about what is stated, and of a worm that has changed, in a canal
+/// that may be wet.
+const COMMON_FRICTION_SIGMAS: [f64; 2] = [0.4, 1.0];
 /// Finite differences: of a logarithm of friction, of stiffness, and of the pull, N.
 const STEPS: [f64; 3] = [0.01, 0.02, 0.03];
 /// Cycles after which everything is searched anew, because the mean profile has become much better.
@@ -78,7 +79,8 @@ pub(super) struct Fit {
     force_per_torque: f64, // of the stepping cell, 1/m
     prior: Vector,
     prior_information: Vector,
-    common_freedom: f64, // information on what all cells' ln friction have in common that a changed worm does not have
+    common_sigma: f64,         // of the mean ln friction of all cells
+    common_freedom: f64,       // information on it that the cells' own standard deviations would have beyond that
     stated_pull_n: (f64, f64), // by the configured slope, with its standard deviation
     measured: MeasuredPull,
     at: Parameters,
@@ -158,6 +160,7 @@ impl Fit {
             force_per_torque: TAU / (cells as f64 * worm.stroke_m()),
             prior: at.values,
             prior_information: sigma.map(|sigma| 1.0 / (sigma * sigma)),
+            common_sigma: 0.0,
             common_freedom: 0.0,
             stated_pull_n: (at.values[pull_at], config.pull_sigma_n),
             measured: MeasuredPull::default(),
@@ -187,6 +190,7 @@ impl Fit {
             before: Before::new(at),
             work: Work::Idle,
         };
+        fit.free_common_friction(COMMON_FRICTION_SIGMAS[0]);
         // What is known before the first cycle.
         fit.work = Work::figures();
         while !fit.step() {}
@@ -256,21 +260,17 @@ impl Fit {
         pull
     }
 
-    /// From now on, all tips together may hold much less, or more, than is stated: they lie in one canal, and it may be wet.
-    fn free_common_friction(&mut self) {
+    /// From now on, all tips together may hold less or more than is stated, by this standard deviation of their mean ln friction.
+    fn free_common_friction(&mut self, sigma: f64) {
         let cells = self.at.cells as f64;
         let stated: f64 = self.prior_information.iter().take(self.at.cells).sum();
-        self.common_freedom = ((stated - COMMON_FRICTION_SIGMA.powi(-2)) / (cells * cells)).max(0.0);
+        self.common_sigma = sigma;
+        self.common_freedom = ((stated - sigma.powi(-2)) / (cells * cells)).max(0.0);
     }
 
     /// Standard deviation of a cell's ln friction before.
     fn friction_sigma(&self, cell: usize) -> f64 {
-        let common = if self.common_freedom > 0.0 {
-            COMMON_FRICTION_SIGMA
-        } else {
-            0.0
-        };
-        self.prior_sigma(cell).hypot(common)
+        self.prior_sigma(cell).hypot(self.common_sigma)
     }
 
     fn bin_weight(bin: usize) -> f64 {

@@ -82,7 +82,7 @@ const ADVANCE_SCATTER_SHARE: f64 = 0.02;
 pub struct SelfSensingConfig {
     /// The motor with its gears.
     pub gear: GearModel,
-    /// Standard deviation of each cell's ln friction about the stated worm's.
+    /// Standard deviation of each cell's ln friction about the stated worm's, beside what all have in common.
     pub friction_sigma: f64,
     /// Standard deviation of each cell's ln stiffness about the stated worm's.
     pub stiffness_sigma: f64,

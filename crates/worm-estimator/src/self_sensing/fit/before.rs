@@ -3,7 +3,7 @@
 //! A fit that begins anew from the first cycle of a worm that is as before may end at another answer than the fit then. Profiles have no such
 //! doubt: a cycle that is much nearer to the mean of before than the changed one was belongs to the worm of before, and its fit goes on.
 
-use super::Fit;
+use super::{COMMON_FRICTION_SIGMAS, Fit};
 use crate::self_sensing::parameters::Parameters;
 use crate::self_sensing::pitch::MeasuredPull;
 use crate::self_sensing::profile::MAX_BINS;
@@ -47,7 +47,7 @@ impl Fit {
         before.velocity_rad_per_s = self.velocity_rad_per_s;
         *before.mean_n_m = *self.mean_n_m;
         self.before.squared_distance = self.squared_distance(torque_n_m);
-        self.free_common_friction();
+        self.free_common_friction(COMMON_FRICTION_SIGMAS[1]);
     }
 
     /// Mean profile of the worm that was set aside, N m at the cam.
@@ -67,7 +67,8 @@ impl Fit {
         (self.cycles, self.squared_cycles) = (before.cycles, before.squared_cycles);
         self.velocity_rad_per_s = before.velocity_rad_per_s;
         *self.mean_n_m = *before.mean_n_m;
-        (self.first_answer, self.common_freedom) = (None, 0.0);
+        self.first_answer = None;
+        self.free_common_friction(COMMON_FRICTION_SIGMAS[0]);
     }
 
     /// Weighted distance of a profile from the mean of the worm that was set aside, squared, N² m².

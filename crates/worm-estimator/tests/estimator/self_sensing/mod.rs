@@ -232,6 +232,42 @@ fn ten_cycles_of_drawn_worms() {
     }
 }
 
+/// All tips lie in one canal, and that may hold them half as well as is stated, or half as well again.
+#[test]
+fn a_canal_of_another_friction_is_found() {
+    for factor in [0.5, 1.6] {
+        let [mut friction, mut losses] = std::array::from_fn(|_| Errors::default());
+        for seed in seeds(10) {
+            let mut drawn = Drawn::new(seed);
+            drawn.worm.scale_friction(None, factor);
+            if drawn.worm.check_hold().is_err() || steady_cycle(&drawn.worm).cycle().is_none() {
+                continue;
+            }
+            let (mut plant, mut sensing) = (Plant::new(&drawn), SelfSensing::new(&drawn.told, &drawn.config()));
+            crawl(&mut plant, &mut sensing, 12, |_, _| {});
+            let sensed = *sensing.sensed().expect("cycles were seen");
+            for cell in 0..sensed.cells {
+                let truth_n = drawn.friction_n(cell);
+                friction.add(
+                    sensed.friction_n[cell] - truth_n,
+                    truth_n,
+                    sensed.friction_sigma_n[cell],
+                );
+            }
+            let [.., before, after] = &plant.milestones[..] else {
+                panic!("twelve cycles")
+            };
+            let truth_j = after.ledger.loss_j() - before.ledger.loss_j();
+            let figures = (&sensed.figures, &sensed.figures_sigma);
+            losses.add(figures.0.energy_loss_j - truth_j, truth_j, figures.1.energy_loss_j);
+        }
+        println!("friction of all cells × {factor}");
+        friction.line("friction, %", 100.0);
+        losses.line("losses (11), %", 100.0);
+        assert!(friction.within(0.2) > 0.85 && friction.coverage() > 0.75, "× {factor}");
+    }
+}
+
 #[test]
 fn distance_after_fifty_cycles() {
     let mut distance = Errors::default();
