@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -25,41 +27,42 @@ while True:
 """
 
 
-def test_a_holder_that_opens_and_closes_other_files_is_seen_all_the_same(tmp_path: Path) -> None:
-    instance = Instance("worm1", tmp_path)
+@contextmanager
+def held(instance: Instance, role: str) -> Iterator[subprocess.Popen[str]]:
+    """Run a process that has a role."""
     instance.folder.mkdir()
-    arguments = [sys.executable, "-c", HOLDER, str(instance.folder / "controller.lock")]
+    arguments = [sys.executable, "-c", HOLDER, str(instance.folder / f"{role}.lock")]
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as holder:
         try:
             assert holder.stdout is not None and holder.stdout.readline() == "has it\n"
-            found = [instance.holder("controller") for _ in range(2000)]
+            yield holder
         finally:
             holder.kill()
+
+
+def test_a_holder_that_opens_and_closes_other_files_is_seen_all_the_same(tmp_path: Path) -> None:
+    instance = Instance("worm1", tmp_path)
+    with held(instance, "controller") as holder:
+        found = [instance.holder("controller") for _ in range(2000)]
     assert found.count(holder.pid) == len(found)
     assert instance.holder("controller") is None
 
 
 def test_a_worm_of_a_robot_that_a_fleet_process_offers_is_told_from_none(tmp_path: Path) -> None:
     instance = Instance("worm1", tmp_path)
-    instance.folder.mkdir()
-    arguments = [sys.executable, "-c", HOLDER, str(instance.folder / "relay.lock")]
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as fleet:
-        try:
-            assert fleet.stdout is not None and fleet.stdout.readline() == "has it\n"
-            with pytest.raises(NotRunning, match="no worm worm1 is running"):
-                instance.require_running()
-            # As `src/topics/fleet_list.rs` has it: the reason why a worm is not offered, or null.
-            worms = {"worm1": None, "worm2": "it runs here"}
-            listed = {
-                "pid": fleet.pid,
-                "config": "fleet.toml",
-                "robots": {"robot1": {"was_heard": True, "problem": None, "worms": worms}},
-            }
-            (tmp_path / "fleet-1-1.json").write_text("{")
-            (tmp_path / "fleet-2-2.json").write_text(json.dumps(listed))
-            with pytest.raises(NotRunning, match="worm1 is a worm of robot1.*run it on robot1"):
-                instance.require_running()
-            with pytest.raises(NotRunning, match="no worm worm2 is running"):
-                Instance("worm2", tmp_path).require_running()
-        finally:
-            fleet.kill()
+    with held(instance, "relay") as fleet:
+        with pytest.raises(NotRunning, match="no worm worm1 is running"):
+            instance.require_running()
+        # As `src/topics/fleet_list.rs` has it: the reason why a worm is not offered, or null.
+        worms = {"worm1": None, "worm2": "it runs here"}
+        listed = {
+            "pid": fleet.pid,
+            "config": "fleet.toml",
+            "robots": {"robot1": {"was_heard": True, "problem": None, "worms": worms}},
+        }
+        (tmp_path / "fleet-1-1.json").write_text("{")
+        (tmp_path / "fleet-2-2.json").write_text(json.dumps(listed))
+        with pytest.raises(NotRunning, match="worm1 is a worm of robot1.*run it on robot1"):
+            instance.require_running()
+        with pytest.raises(NotRunning, match="no worm worm2 is running"):
+            Instance("worm2", tmp_path).require_running()

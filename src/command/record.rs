@@ -86,7 +86,7 @@ pub fn run(args: &RecordArgs) -> Result<(), Failure> {
     if let Some(worm) = elsewhere {
         if options.rate_hz.is_some() {
             return Err(Failure::unusable(
-                "20 ticks a second come over a network whatever is asked for: leave --rate out, or record on the robot",
+                "over a network 20 ticks a second come, and --rate cannot change that: leave it out, or record on the robot",
             ));
         }
         return run_over_network(args, worm, text, (out, options), &end, &rounds);

@@ -22,27 +22,22 @@ fn length(path: &Path) -> u64 {
     path.metadata().map_or(0, |metadata| metadata.len())
 }
 
+/// The summary of eight seconds that are recorded.
+fn record_up(worm: &Worm, config: &str, file: &str, more: &[&str]) -> serde_json::Value {
+    let up = ["up", "--json", "--duration", "8", "--config", config, "--record", file];
+    let output = worm.wormd(&[&up, more].concat()).output();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{}\n{error}", output.status);
+    serde_json::from_slice(&output.stdout).expect("a summary")
+}
+
 #[test]
 fn the_main_job_records_what_replays_to_the_same_results() {
     let worm = Worm::new("record");
     let folder = tempfile::tempdir().expect("a folder");
     let (path, file) = path_in(&folder);
     let config = worm.config(FAST);
-    let output = worm
-        .wormd(&[
-            "up",
-            "--json",
-            "--duration",
-            "8",
-            "--config",
-            &config,
-            "--record",
-            &file,
-        ])
-        .output();
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{}\n{error}", output.status);
-    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a summary");
+    let summary = record_up(&worm, &config, &file, &[]);
     assert_eq!(worm.stale_resources(), Vec::<String>::new());
 
     let log = messages(&path).expect("a log");
@@ -115,22 +110,7 @@ fn a_thinned_recording_has_few_ticks_and_every_cycle() {
     let folder = tempfile::tempdir().expect("a folder");
     let (path, file) = path_in(&folder);
     let config = worm.config(FAST);
-    let up = [
-        "up",
-        "--json",
-        "--duration",
-        "8",
-        "--config",
-        &config,
-        "--record",
-        &file,
-        "--rate",
-        "50",
-    ];
-    let output = worm.wormd(&up).output();
-    let error = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{}\n{error}", output.status);
-    let summary: serde_json::Value = serde_json::from_slice(&output.stdout).expect("a summary");
+    let summary = record_up(&worm, &config, &file, &["--rate", "50"]);
     let log = messages(&path).expect("a log");
     assert!(
         log.warnings.iter().any(|note| note.contains("only 50 ticks")),
