@@ -2,14 +2,13 @@
 
 use super::PATIENCE;
 use super::http::{Browser, request};
-use super::watched::start;
+use super::watched::{slow_worm, start};
 use super::worm::{Process, Worm, wait_for};
 use nix::sys::signal::Signal;
 use serde_json::json;
 
-/// A worm in a folder of its own for all worms, at rest.
+/// A worm in a folder for all worms, at rest.
 struct Neighbour {
-    config: String,
     controller: Process,
     _estimator: Process,
     _virtual_worm: Process,
@@ -18,18 +17,12 @@ struct Neighbour {
 
 impl Neighbour {
     fn start(name: &str, root: &std::path::Path) -> Self {
-        let worm = Worm::on_a_steady_computer(name);
-        // Slow enough for two worms and a browser on a busy computer.
-        let text = format!("[control]\nrate_hz = 100.0\n[topics]\nroot = \"{}\"\n", root.display());
-        let config = worm.config(&text);
+        let worm = slow_worm(name, root);
         let port = worm.port();
-        let virtual_worm = worm
-            .plain_wormd(&["virtual-worm", "--config", &config, "--link", &port])
-            .start();
-        let estimator = worm.wormd(&["estimate", "--config", &config]).start();
-        let controller = worm.wormd(&["control", "--config", &config, "--port", &port]).start();
+        let virtual_worm = worm.virtual_worm(&[]);
+        let estimator = worm.wormd(&["estimate"]).start();
+        let controller = worm.wormd(&["control", "--port", &port]).start();
         Self {
-            config,
             controller,
             _estimator: estimator,
             _virtual_worm: virtual_worm,
@@ -40,7 +33,7 @@ impl Neighbour {
     /// Tries to make it crawl, whatever has stopped it on a busy computer.
     fn try_to_crawl(&self) {
         for arguments in [&["reset"][..], &["arm"], &["crawl", "--for", "100"]] {
-            let arguments = [&["command"], arguments, &["--config", &self.config]].concat();
+            let arguments = [&["command"], arguments].concat();
             // A reset that is not needed is refused.
             let _ = self.worm.wormd(&arguments).output();
         }
@@ -55,7 +48,7 @@ fn all_worms_are_on_one_page_and_one_button_holds_them() {
         Neighbour::start("d-one", root.path()),
         Neighbour::start("d-two", root.path()),
     );
-    let arguments = ["dashboard", "--listen", "127.0.0.1:0", "--config", &one.config];
+    let arguments = ["dashboard", "--listen", "127.0.0.1:0"];
     let (_dashboard, address) = start(one.worm.wormd(&arguments).into_command());
     let worms = || request(address, "GET", "/api/fleet", &[], "").json()["worms"].clone();
     let is_in = |mode: &str| {

@@ -7,7 +7,9 @@ use nix::sys::signal::Signal;
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
 
 /// A dashboard that ends with the test, however that ends.
 pub struct Dashboard(pub Child);
@@ -47,12 +49,21 @@ pub struct Watched {
     _estimator: Process,
     _virtual_worm: Process,
     pub worm: Worm,
+    _root: tempfile::TempDir,
+}
+
+/// A worm with this folder for its topics, slow enough for others and browsers beside it on a busy computer: the dashboard is what is tested.
+pub fn slow_worm(name: &str, root: &Path) -> Worm {
+    let text = format!("[control]\nrate_hz = 100.0\n[topics]\nroot = \"{}\"\n", root.display());
+    Worm::configured(name, &text)
 }
 
 impl Watched {
     /// The dashboard is there before its worm.
     pub fn start(name: &str) -> Self {
-        let worm = Worm::on_a_steady_computer(name);
+        // What holds all worms must not reach those of other tests.
+        let root = tempfile::tempdir_in("/dev/shm").expect("a folder in /dev/shm");
+        let worm = slow_worm(name, root.path());
         let arguments = ["dashboard", "--listen", "127.0.0.1:0"];
         let (dashboard, address) = start(
             worm.wormd(&arguments)
@@ -71,6 +82,7 @@ impl Watched {
             _estimator: estimator,
             _virtual_worm: virtual_worm,
             worm,
+            _root: root,
         };
         watched.wait_for_health("live");
         watched
@@ -96,7 +108,16 @@ impl Watched {
     }
 
     pub fn wait_for_mode(&self, mode: &str) {
-        wait_for(mode, PATIENCE, || self.mode() == mode);
+        let begun = Instant::now();
+        while self.mode() != mode {
+            assert!(
+                begun.elapsed() < PATIENCE,
+                "waited in vain: {mode}; it is {}, after {:?}",
+                self.get("/api/state").body,
+                events(self)
+            );
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 
     pub fn arm(&self, client: &str) {

@@ -8,7 +8,7 @@ use nix::unistd::Pid;
 use std::io::{BufRead, BufReader, Read};
 use std::os::fd::OwnedFd;
 use std::os::unix::process::CommandExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, Mutex};
@@ -23,6 +23,8 @@ use wormd::topics::{CommandClient, Hub, Instance, Subscriber};
 pub struct Worm {
     name: String,
     folder: tempfile::TempDir,
+    /// The configuration file of all its processes, where it has one.
+    config: Option<String>,
     receiver: Mutex<Option<TelemetryReceiver>>,
     pauses: Option<Arc<HostPauses>>,
 }
@@ -61,14 +63,26 @@ impl Worm {
         Self {
             name,
             folder,
+            config: None,
             receiver: Mutex::new(None),
             pauses: None,
         }
     }
 
+    /// A worm whose processes all have this configuration, on a steady computer.
+    #[allow(dead_code, reason = "the tests of the dashboard, which share this harness, need it")]
+    pub fn configured(name: &str, text: &str) -> Self {
+        let mut worm = Self::on_a_steady_computer(name);
+        worm.config = Some(worm.config(text));
+        worm
+    }
+
     /// Where its topics are.
     pub fn instance(&self) -> Instance {
-        let mut config = Config::default();
+        let mut config = match &self.config {
+            Some(file) => Config::load(Path::new(file)).expect("a configuration"),
+            None => Config::default(),
+        };
         config.worm.name.clone_from(&self.name);
         Instance::of(&config).expect("the topics' root can be used")
     }
@@ -96,7 +110,10 @@ impl Worm {
 
     /// `wormd` with these arguments and this worm's name.
     pub fn wormd(&self, arguments: &[&str]) -> Invocation {
-        let named = [arguments, &["--name", &self.name]].concat();
+        let mut named = [arguments, &["--name", &self.name]].concat();
+        if let Some(config) = &self.config {
+            named.extend(["--config", config]);
+        }
         Invocation::new(&named, self.pauses.clone())
     }
 
@@ -110,6 +127,9 @@ impl Worm {
         let port = self.port();
         let mut arguments = vec!["virtual-worm", "--link", &port];
         arguments.extend(more);
+        if let Some(config) = &self.config {
+            arguments.extend(["--config", config]);
+        }
         Invocation::new(&arguments, self.pauses.clone()).start()
     }
 

@@ -22,7 +22,7 @@ use super::mechanics::Mechanics;
 use super::pad::{Hold, Loaded, Pad, Rate};
 use super::table::Whereabouts;
 use super::worm::SlidesDown;
-use crate::MAX_CELLS;
+use crate::{MAX_CELLS, MAX_TABLES};
 
 /// Velocity of the body beyond which it counts as sliding down, m/s.
 const LOST_M_S: f64 = 1.0;
@@ -67,9 +67,11 @@ struct Cell {
     pad: Pad,
     drive_m: f64,
     drag_n: f64, // on the cell, in the last increment, and the push of tables
-    // These four only where there are tables.
+    // These six only where there are tables.
     speed_m_s: f64,
-    strain_m_s: f64,                   // of its pad
+    strain_m_s: f64, // of its pad
+    recent_deformation_m: [f64; MAX_TABLES],
+    recent_slide_m: [f64; MAX_TABLES],
     displaced_m: Option<Displacement>, // in the drive; none before the first increment, which moves nothing by it
     turned_m_per_cycle: f64,           // rate at which the drive's displacement changed with the phase alone
     trial: Trial,
@@ -98,6 +100,7 @@ struct Trial {
 struct Increment {
     step_s: f64,
     rate: Rate,
+    remembered: [f64; MAX_TABLES], // by each table, a fraction
     drag_n_per_m: f64,
     inertia_n_per_m: f64, // 0 without mass
 }
@@ -352,6 +355,8 @@ impl Crawl {
                     deformation_rate_m_s: cell.strain_m_s,
                     speed_m_s: cell.speed_m_s,
                     load_n: cell.pad.force_n + mechanics.standing_n[index],
+                    recent_deformation_m: cell.recent_deformation_m,
+                    recent_slide_m: cell.recent_slide_m,
                     place_m: self.position_m[index] - cell.pad.deformation_m,
                     phase: mechanics.own_phase(index, &cam),
                     slope_deg,
@@ -382,6 +387,7 @@ impl Crawl {
                 },
                 damping_n_per_m: damping_n_s_per_m / step_s,
             },
+            remembered: tables.map_or([0.0; MAX_TABLES], |tables| tables.remembered_after(step_s)),
             drag_n_per_m: laws.drag_n_s_per_m / step_s,
             inertia_n_per_m: 4.0 * mass_kg / (step_s * step_s),
         }
@@ -445,7 +451,14 @@ impl Crawl {
             cell.drag_n = drag_n;
             if has_tables {
                 cell.speed_m_s = shift_m / increment.step_s;
-                cell.strain_m_s = (loaded.deformation_m - before_m) / increment.step_s;
+                let strain_m = loaded.deformation_m - before_m;
+                cell.strain_m_s = strain_m / increment.step_s;
+                let slide_m = loaded.slide_m.abs();
+                for (table, left) in increment.remembered.into_iter().enumerate() {
+                    let (deformation_m, slid_m) = (cell.recent_deformation_m[table], cell.recent_slide_m[table]);
+                    cell.recent_deformation_m[table] = (deformation_m + strain_m) * left;
+                    cell.recent_slide_m[table] = (slid_m + slide_m) * left;
+                }
                 let after_m = cell.trial.displaced_m;
                 let before_m = cell.displaced_m.replace(after_m).unwrap_or(after_m);
                 let turned = phase - self.phase;

@@ -6,9 +6,14 @@
 //! the drive holds it, or turns and brakes the motor ([`ActsOn`]); those of the motor stand in [`crate::servo::ServoLaws`].
 //!
 //! # When it is evaluated
-//! A force that depends on the deformation, its rate, the speed or the load is taken at the end of each increment, as every other force
-//! is; all else, and what friction depends on, is taken at its start. A displacement by one of these four goes half of its way in each
-//! increment, so that a drive which yields under load as much as its pad does is still stable.
+//! A force that depends on the deformation, now or recently, its rate, the speed or the load is taken at the end of each increment, as every
+//! other force is; all else, and what friction depends on, is taken at its start. A displacement by one of these five goes half of its way in
+//! each increment, so that a drive which yields under load as much as its pad does is still stable.
+//!
+//! # Memory
+//! Two axes depend on what was before, with weights exp(−age/`memory_s`): the deformation beyond its own mean, and how far the tip has slid. A
+//! force in proportion to the first is that of a spring with a dashpot in series (Maxwell), as pads have that creep; friction that falls with the
+//! second is held again after a rest, as breakaway friction is.
 
 mod axis;
 mod error;
@@ -27,12 +32,17 @@ pub const MAX_TABLES: usize = 4;
 /// Most points along one axis.
 pub const MAX_POINTS: usize = 256;
 
+/// How far a table remembers where nothing else is said, s; and the shortest and the longest time that may be said.
+const MEMORY_S: f64 = 1.0;
+const MEMORIES_S: [f64; 2] = [1e-3, 1e4];
+
 /// A law at the points of a grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     acts_on: ActsOn,
     grids: Vec<Grid>, // 1 or 2
     value: Vec<f64>,  // `[of the first axis][of the second]`, flat
+    memory_s: f64,    // of an axis that has one
 }
 
 impl Table {
@@ -104,7 +114,31 @@ impl Table {
                 unit: acts_on.unit(),
             });
         }
-        Ok(Self { acts_on, grids, value })
+        Ok(Self {
+            acts_on,
+            grids,
+            value,
+            memory_s: MEMORY_S,
+        })
+    }
+
+    /// The same with another time that it remembers, s, than one second: that in which what was is forgotten down to 1/e.
+    ///
+    /// # Errors
+    /// [`TableError::Memory`].
+    pub fn with_memory(self, memory_s: f64) -> Result<Self, TableError> {
+        let refuse = |problem| Err(TableError::Memory { memory_s, problem });
+        let [min_s, max_s] = MEMORIES_S;
+        if !self.axes().any(Axis::has_memory) {
+            let axes = [Axis::RecentDeformation, Axis::RecentSlide]
+                .map(Axis::name)
+                .join(" or ");
+            return refuse(format!("only a table over {axes} remembers: leave it out"));
+        }
+        if !(min_s..=max_s).contains(&memory_s) {
+            return refuse(format!("must be from {min_s} to {max_s} s"));
+        }
+        Ok(Self { memory_s, ..self })
     }
 
     /// What it gives.
@@ -125,6 +159,11 @@ impl Table {
     /// The period of the first axis, where it has one.
     pub fn period(&self) -> Option<f64> {
         self.grids[0].period
+    }
+
+    /// How far it remembers, s; none where it has no axis that does.
+    pub fn memory_s(&self) -> Option<f64> {
+        self.axes().any(Axis::has_memory).then_some(self.memory_s)
     }
 
     /// The values, for each point of the first axis those of the second.
@@ -277,8 +316,8 @@ mod tests {
                 vec![(Axis::GearLoad, vec![0.0])],
                 vec![0.0],
                 None,
-                "acts_on = \"contact-force\" cannot depend on gear-load: give deformation, deformation-rate, speed, load, place, phase, \
-                 slope, time",
+                "acts_on = \"contact-force\" cannot depend on gear-load: give deformation, deformation-rate, recent-deformation, speed, \
+                 load, place, recent-slide, phase, slope, time",
             ),
         ] {
             let error = table(&axes, &value, period).expect_err(expected).to_string();

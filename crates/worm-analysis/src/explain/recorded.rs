@@ -31,9 +31,10 @@ pub fn explain(
     let base = Hypothesis::new(&worm.nuisances(), &[]);
     let at = measure_noise(&mut worm, &base)?;
     let (problem, discrepancy, recalibrated) = recalibrate(&worm, &base, at, options.discrepancy);
-    let found = find(&problem, &discrepancy, &recalibrated, options, &mut report);
+    let mut found = find(&problem, &discrepancy, &recalibrated, options, &mut report);
     // Under wrong conditions a law would be one of theirs.
     let is_misstated = found.selected.is_misstated();
+    let laws = found.laws.take();
     let law = (found.selected.verdict == Verdict::OutsideLibrary && !is_misstated).then(|| {
         let search = LawSearch {
             problem: &problem,
@@ -42,7 +43,7 @@ pub fn explain(
             without: &found.recalibrated_held_out,
             folds: &worm.folds(),
         };
-        let laws = search.fit(&mut |fraction| report("law", 0.92 + 0.03 * fraction));
+        let laws = laws.unwrap_or_else(|| search.fit(&mut |fraction| report("law", 0.92 + 0.03 * fraction)));
         search.best(laws, &mut |fraction| report("law", 0.95 + 0.02 * fraction))
     });
     let cycles_s: Vec<f64> = runs

@@ -21,6 +21,8 @@ fn drawn(axis: &str) -> (f64, String) {
         Ok(Over::Deformation) => (1e3, "deformation of the pad, mm".to_owned()),
         Ok(Over::Place) => (1e3, "place of the tip along the canal, mm".to_owned()),
         Ok(Over::DeformationRate) => (1e3, "rate of the deformation, mm/s".to_owned()),
+        Ok(Over::RecentDeformation) => (1e3, "deformation beyond its recent mean, mm".to_owned()),
+        Ok(Over::RecentSlide) => (1e3, "recent slide of the tip, mm".to_owned()),
         Ok(Over::Speed) => (1e3, "speed of the cell, mm/s".to_owned()),
         Ok(Over::Load) => (1.0, "load on the cell, N".to_owned()),
         Ok(Over::Phase) => (1.0, "part of a cycle since the cell's own step began".to_owned()),

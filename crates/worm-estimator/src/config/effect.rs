@@ -109,7 +109,10 @@ impl Effect {
         // Cell 0 becomes one beyond the last, which is refused.
         let cell = self.cell.map(|cell| cell.wrapping_sub(1));
         if TableFields::is_of(&self.name) {
-            TableFields::refuse_parameters(&self.parameters, "acts_on, axis, grid, value, period and cell")?;
+            TableFields::refuse_parameters(
+                &self.parameters,
+                "acts_on, axis, grid, value, period, memory_s and cell",
+            )?;
             return Setting::of_table(self.table.table()?, cell, cells);
         }
         self.table.refuse_in(&self.name)?;

@@ -24,6 +24,9 @@ pub struct TableFields {
     /// Width after which it repeats along its first axis, in the unit of that.
     #[serde(default)]
     pub period: Option<f64>,
+    /// How far it remembers, s, where it depends on a `recent-deformation` or a `recent-slide`.
+    #[serde(default)]
+    pub memory_s: Option<f64>,
 }
 
 /// One thing, or a list of them.
@@ -58,6 +61,7 @@ impl TableFields {
             ("grid", self.grid.is_some()),
             ("value", self.value.is_some()),
             ("period", self.period.is_some()),
+            ("memory_s", self.memory_s.is_some()),
         ];
         given.into_iter().find(|(_, is_given)| *is_given).map(|(name, _)| name)
     }
@@ -124,7 +128,11 @@ impl TableFields {
         }
         let axes: Result<Vec<Axis>, TableError> = axes.iter().map(|name| Axis::named(name)).collect();
         let with_grids: Vec<(Axis, Vec<f64>)> = axes?.into_iter().zip(grids).collect();
-        Ok(Table::new(ActsOn::named(acts_on)?, &with_grids, value, self.period)?)
+        let table = Table::new(ActsOn::named(acts_on)?, &with_grids, value, self.period)?;
+        match self.memory_s {
+            Some(memory_s) => Ok(table.with_memory(memory_s)?),
+            None => Ok(table),
+        }
     }
 
     /// Whether an effect is a table.

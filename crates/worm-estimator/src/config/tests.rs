@@ -243,7 +243,11 @@ fn bad_values_are_named_with_file_place_and_remedy() {
         ),
         (
             "[[effect]]\nname = \"table\"\nacts_on = \"contact-force\"\naxis = \"place\"\ngrid = [0.0]\nvalue = [1.0]\nforce_n = 1.0\n",
-            "effect `table` has no parameter `force_n`: it has acts_on, axis, grid, value, period and cell",
+            "effect `table` has no parameter `force_n`: it has acts_on, axis, grid, value, period, memory_s and cell",
+        ),
+        (
+            "[[effect]]\nname = \"table\"\nacts_on = \"contact-force\"\naxis = \"place\"\ngrid = [0.0]\nvalue = [1.0]\nmemory_s = 0.2\n",
+            "effect `table`: memory_s = 0.2: only a table over recent-deformation or recent-slide remembers: leave it out",
         ),
         (
             "[[effect]]\nname = \"table\"\nacts_on = \"motor-friction\"\naxis = \"gear-load\"\ngrid = [0.0]\nvalue = [0.1]\n",

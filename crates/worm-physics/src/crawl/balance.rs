@@ -150,12 +150,17 @@ fn push(
         deformation_rate_m_s: (loaded.deformation_m - pad.deformation_m) / step_s,
         speed_m_s: trial.shift_m / step_s,
         load_n: loaded.force_n + mechanics.standing_n[index],
+        recent_deformation_m: std::array::from_fn(|table| {
+            let recent_m = trial.here.recent_deformation_m[table];
+            (recent_m + loaded.deformation_m - pad.deformation_m) * increment.remembered[table]
+        }),
         ..trial.here
     };
     let slopes = Slopes {
         deformation: (loaded.tangent_n_per_m / mechanics.pad[index].stiffness_n_per_m).clamp(0.0, 1.0),
         load_n_per_m: loaded.tangent_n_per_m,
         per_s: step_s.recip(),
+        remembered: increment.remembered,
     };
     let (moving_n, moving_slope) = tables.moving_n(index, &here, &slopes);
     (trial.standing_n + moving_n, moving_slope)

@@ -5,6 +5,7 @@ mod compliance;
 mod convergence;
 mod damper;
 mod energy_balance;
+mod memory;
 mod tables;
 
 use crate::Worm;

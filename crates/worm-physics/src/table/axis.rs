@@ -15,12 +15,16 @@ pub enum Axis {
     Deformation,
     /// Rate at which the deformation changes, m/s.
     DeformationRate,
+    /// Deformation beyond its own mean over the time that the table remembers, m: what a pad that relaxes still feels.
+    RecentDeformation,
     /// Velocity of the cell along the canal, m/s.
     Speed,
     /// Force that the drive holds the cell with, N: that of its contact, its weight along the canal and constant forces.
     Load,
     /// Place of the tip along the canal, m.
     Place,
+    /// How far the tip has slid, either way, in the time that the table remembers, m.
+    RecentSlide,
     /// Part of a gait cycle since the cell's own step began, 0 to 1.
     Phase,
     /// Slope of the canal, degrees.
@@ -39,12 +43,14 @@ pub enum Axis {
 
 impl Axis {
     /// Every axis.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 14] = [
         Self::Deformation,
         Self::DeformationRate,
+        Self::RecentDeformation,
         Self::Speed,
         Self::Load,
         Self::Place,
+        Self::RecentSlide,
         Self::Phase,
         Self::Slope,
         Self::Time,
@@ -59,9 +65,11 @@ impl Axis {
         match self {
             Self::Deformation => "deformation",
             Self::DeformationRate => "deformation-rate",
+            Self::RecentDeformation => "recent-deformation",
             Self::Speed => "speed",
             Self::Load => "load",
             Self::Place => "place",
+            Self::RecentSlide => "recent-slide",
             Self::Phase => "phase",
             Self::Slope => "slope",
             Self::Time => "time",
@@ -75,7 +83,7 @@ impl Axis {
     /// Its unit.
     pub fn unit(self) -> &'static str {
         match self {
-            Self::Deformation | Self::Place => "m",
+            Self::Deformation | Self::RecentDeformation | Self::Place | Self::RecentSlide => "m",
             Self::DeformationRate | Self::Speed => "m/s",
             Self::Load => "N",
             Self::Phase | Self::Time => "cycles",
@@ -106,11 +114,16 @@ impl Axis {
         )
     }
 
+    /// Whether it depends on a time that is remembered.
+    pub fn has_memory(self) -> bool {
+        matches!(self, Self::RecentDeformation | Self::RecentSlide)
+    }
+
     /// Whether it changes with the motion within an increment: a force over it is balanced together with the motion.
     pub(super) fn changes_with_motion(self) -> bool {
         matches!(
             self,
-            Self::Deformation | Self::DeformationRate | Self::Speed | Self::Load
+            Self::Deformation | Self::DeformationRate | Self::RecentDeformation | Self::Speed | Self::Load
         )
     }
 
@@ -123,7 +136,7 @@ impl Axis {
     /// began.
     pub(super) fn mirrored(self, at: f64, cells: usize) -> f64 {
         match self {
-            Self::Time => at,
+            Self::Time | Self::RecentSlide => at,
             Self::Phase => ((cells as f64).recip() - at).rem_euclid(1.0),
             _ => -at,
         }

@@ -74,4 +74,12 @@ pub enum TableError {
         /// What is wrong and what to do.
         problem: String,
     },
+    /// A time that cannot be remembered.
+    #[error("memory_s = {memory_s}: {problem}")]
+    Memory {
+        /// The one given.
+        memory_s: f64,
+        /// What is wrong and what to do.
+        problem: String,
+    },
 }

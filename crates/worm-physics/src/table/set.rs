@@ -17,6 +17,9 @@ pub(crate) struct Whereabouts {
     pub deformation_rate_m_s: f64,
     pub speed_m_s: f64,
     pub load_n: f64,
+    /// These two for each table, by the time that it remembers.
+    pub recent_deformation_m: [f64; MAX_TABLES],
+    pub recent_slide_m: [f64; MAX_TABLES],
     pub place_m: f64,
     pub phase: f64,
     pub slope_deg: f64,
@@ -24,13 +27,15 @@ pub(crate) struct Whereabouts {
 }
 
 impl Whereabouts {
-    fn on(&self, axis: Axis) -> f64 {
+    fn on(&self, axis: Axis, table: usize) -> f64 {
         match axis {
             Axis::Deformation => self.deformation_m,
             Axis::DeformationRate => self.deformation_rate_m_s,
+            Axis::RecentDeformation => self.recent_deformation_m[table],
             Axis::Speed => self.speed_m_s,
             Axis::Load => self.load_n,
             Axis::Place => self.place_m,
+            Axis::RecentSlide => self.recent_slide_m[table],
             Axis::Phase => self.phase,
             Axis::Slope => self.slope_deg,
             Axis::Time => self.cycles,
@@ -49,16 +54,20 @@ pub(crate) struct Slopes {
     pub load_n_per_m: f64,
     /// Inverse of the increment, 1/s.
     pub per_s: f64,
+    /// What each table still remembers after the increment, a fraction.
+    pub remembered: [f64; MAX_TABLES],
 }
 
 impl Slopes {
-    fn of(&self, axis: Axis) -> f64 {
+    fn of(&self, axis: Axis, table: usize) -> f64 {
         match axis {
             Axis::Deformation => self.deformation,
+            Axis::RecentDeformation => self.deformation * self.remembered[table],
             Axis::DeformationRate => self.deformation * self.per_s,
             Axis::Speed => self.per_s,
             Axis::Load => self.load_n_per_m,
             Axis::Place
+            | Axis::RecentSlide
             | Axis::Phase
             | Axis::Slope
             | Axis::Time
@@ -90,9 +99,22 @@ impl Tables {
             .map(|(table, cell)| (&**table, *cell))
     }
 
-    fn of_cell(&self, cell: usize) -> impl Iterator<Item = &Table> {
-        let mine = self.iter().filter(move |(_, of)| of.is_none_or(|of| of == cell));
-        mine.map(|(table, _)| table)
+    /// The tables of a cell that give something, each with its number among all.
+    fn of_cell(&self, cell: usize, acts_on: ActsOn) -> impl Iterator<Item = (usize, &Table)> {
+        let mine = self
+            .iter()
+            .enumerate()
+            .filter(move |(_, (table, of))| table.acts_on == acts_on && of.is_none_or(|of| of == cell));
+        mine.map(|(number, (table, _))| (number, table))
+    }
+
+    /// What each table still remembers after a time, a fraction of what it did.
+    pub(crate) fn remembered_after(&self, step_s: f64) -> [f64; MAX_TABLES] {
+        let mut remembered = [0.0; MAX_TABLES];
+        for (left, (table, _)) in remembered.iter_mut().zip(self.iter()) {
+            *left = (-step_s / table.memory_s).exp();
+        }
+        remembered
     }
 
     /// Whether one cycle can be like the next: nothing depends on the place or the time.
@@ -123,37 +145,38 @@ impl Tables {
 
     /// The factor on the friction of a cell's tip.
     pub(crate) fn friction(&self, cell: usize, here: &Whereabouts) -> f64 {
-        let factors = self
-            .of_cell(cell)
-            .filter(|table| table.acts_on == ActsOn::FrictionFactor);
-        factors.map(|table| table.at(|axis| here.on(axis)).0).product()
+        let factors = self.of_cell(cell, ActsOn::FrictionFactor);
+        factors
+            .map(|(number, table)| table.at(|axis| here.on(axis, number)).0)
+            .product()
     }
 
     /// The force on a cell, N, that does not change within an increment.
     pub(crate) fn standing_n(&self, cell: usize, here: &Whereabouts) -> f64 {
-        let forces = self.of_cell(cell).filter(|table| table.acts_on == ActsOn::ContactForce);
-        let standing = forces.filter(|table| !table.axes().any(Axis::changes_with_motion));
-        standing.map(|table| table.at(|axis| here.on(axis)).0).sum()
+        let forces = self.of_cell(cell, ActsOn::ContactForce);
+        let standing = forces.filter(|(_, table)| !table.axes().any(Axis::changes_with_motion));
+        standing
+            .map(|(number, table)| table.at(|axis| here.on(axis, number)).0)
+            .sum()
     }
 
     /// The force on a cell that changes with its motion, N, and its derivative by the cell's displacement, N/m.
     pub(crate) fn moving_n(&self, cell: usize, here: &Whereabouts, slopes: &Slopes) -> (f64, f64) {
-        let forces = self.of_cell(cell).filter(|table| table.acts_on == ActsOn::ContactForce);
-        let moving = forces.filter(|table| table.axes().any(Axis::changes_with_motion));
-        moving.fold((0.0, 0.0), |(force_n, slope), table| {
-            let (value, by_axis) = table.at(|axis| here.on(axis));
-            let by_shift: f64 = table.axes().zip(by_axis).map(|(axis, by)| by * slopes.of(axis)).sum();
+        let forces = self.of_cell(cell, ActsOn::ContactForce);
+        let moving = forces.filter(|(_, table)| table.axes().any(Axis::changes_with_motion));
+        moving.fold((0.0, 0.0), |(force_n, slope), (number, table)| {
+            let (value, by_axis) = table.at(|axis| here.on(axis, number));
+            let by_axis = table.axes().zip(by_axis);
+            let by_shift: f64 = by_axis.map(|(axis, by)| by * slopes.of(axis, number)).sum();
             (force_n + value, slope + by_shift)
         })
     }
 
     /// How far ahead of its cam the drive holds a cell, m: by what does not change with the motion, and by what does.
     pub(crate) fn displacement_m(&self, cell: usize, here: &Whereabouts) -> [f64; 2] {
-        let mine = self
-            .of_cell(cell)
-            .filter(|table| table.acts_on == ActsOn::DriveDisplacement);
-        mine.fold([0.0; 2], |[standing_m, moving_m], table| {
-            let by_m = table.at(|axis| here.on(axis)).0;
+        let mine = self.of_cell(cell, ActsOn::DriveDisplacement);
+        mine.fold([0.0; 2], |[standing_m, moving_m], (number, table)| {
+            let by_m = table.at(|axis| here.on(axis, number)).0;
             if table.axes().any(Axis::changes_with_motion) {
                 [standing_m, moving_m + by_m]
             } else {

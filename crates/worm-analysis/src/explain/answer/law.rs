@@ -41,6 +41,9 @@ pub struct LawOver {
     pub cell: Option<usize>,
     /// Width after which it repeats, in the unit of its first axis.
     pub period: Option<f64>,
+    /// How far it remembers, s, where it depends on what was; left out of the JSON otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory_s: Option<f64>,
 }
 
 /// A law at the points of a grid, as `[[effect]] name = "table"` has it.

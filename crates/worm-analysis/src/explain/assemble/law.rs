@@ -75,6 +75,7 @@ fn over(shape: &LawShape) -> LawOver {
         axis: axes(shape, |(axis, _)| axis.name()),
         cell: shape.cell.map(|cell| cell + 1),
         period: shape.period,
+        memory_s: shape.memory_s,
     }
 }
 
@@ -138,6 +139,9 @@ fn depends(over: &LawOver) -> String {
             Err(_) => String::new(),
         };
     }
+    if let Some(memory_s) = over.memory_s {
+        text += &format!(" in the last {memory_s} s");
+    }
     text
 }
 
@@ -146,9 +150,11 @@ fn axis_in_words(name: &str) -> &str {
     match Axis::named(name) {
         Ok(Axis::Deformation) => "the deformation of the pad",
         Ok(Axis::DeformationRate) => "the rate at which the pad is deformed",
+        Ok(Axis::RecentDeformation) => "how far the pad was deformed further",
         Ok(Axis::Speed) => "the speed of the cell",
         Ok(Axis::Load) => "the load on the cell",
         Ok(Axis::Place) => "the place in the canal",
+        Ok(Axis::RecentSlide) => "how far the tip has slid",
         Ok(Axis::Phase) => "the phase of the gait",
         Ok(Axis::Slope) => "the slope",
         Ok(Axis::Time) => "the time since the start of the run",

@@ -69,6 +69,9 @@ fn table(law: &FoundLaw) -> String {
         .copied()
         .zip(law.grid.all().into_iter().map(Vec::as_slice))
         .collect();
+    if let Some(memory_s) = law.over.memory_s {
+        text += &format!("memory_s = {}\n", without_error(memory_s));
+    }
     text + &table_fields(law.over.acts_on, &axes, law.over.period, &law.value)
 }
 

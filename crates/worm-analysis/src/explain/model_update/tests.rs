@@ -345,6 +345,7 @@ fn a_law_is_written_as_a_table_and_read_back() {
         axis: LawAxes::One("place"),
         cell: Some(2),
         period: Some(0.041),
+        memory_s: None,
     };
     let one = FoundLaw {
         rivals: Vec::new(),
@@ -365,6 +366,7 @@ fn a_law_is_written_as_a_table_and_read_back() {
             axis: LawAxes::Two(["phase", "slope"]),
             cell: None,
             period: Some(1.0),
+            memory_s: None,
         },
         grid: LawAxes::Two([vec![0.0, 0.5], vec![0.0, 20.0, 40.0]]),
         value: vec![0.0, 0.1, 0.2, -0.3, 0.0, 0.5],

@@ -4,7 +4,7 @@ use super::discrepancy::Discrepancy;
 use super::fit::Fit;
 use super::held_out::HeldOut;
 use super::judge::candidate::{Candidate, kinds};
-use super::judge::decision::{Selected, decide};
+use super::judge::decision::{Judged, Selected, decide};
 use super::judge::evidence::{InTime, evidence};
 use super::judge::prior;
 use super::judgement::{FALSE_NAMES, Judge, WORTH_A_LOOK, held_out};
@@ -81,7 +81,7 @@ pub(in crate::explain) struct Found {
     pub open_share: f64,
     /// Improvement that the best of the library reaches by chance in one campaign of a hundred.
     pub threshold: f64,
-    /// Laws that nobody listed, where the plant has them weighed against the library.
+    /// Laws that nobody listed, where they were weighed against the library or against conditions that are stated wrongly.
     pub laws: Option<FittedLaws>,
     /// The mistake in what is stated about the recordings that explains most, where one explains something.
     pub misstated: Option<Misstated>,
@@ -197,7 +197,16 @@ pub(in crate::explain) fn find<P: Plant>(
         .filter(|screening| !fitted.contains(&&screening.hypothesised))
         .map(|screening| judge.none.usual + judge.ln_prior(&[screening.hypothesised]) + screening.ln_bayes.min(0.0))
         .collect();
-    let laws = plant.weighs_laws().then(|| {
+    let best = judged.iter().map(|one| one.candidate.improvement).fold(0.0, f64::max);
+    let misstated = misstated(&judge, best);
+    // What nobody listed can look like an effect or like wrong conditions, and may be what is missing as well as they.
+    let ln_none = prior::NONE.ln() + judge.none.usual;
+    let of_answers = judged
+        .iter()
+        .map(Judged::ln_weight)
+        .chain(misstated.iter().map(|one| one.ln_weight));
+    let is_something = of_answers.fold(f64::NEG_INFINITY, f64::max) > ln_none;
+    let laws = (is_something || plant.weighs_laws()).then(|| {
         let search = LawSearch {
             problem,
             discrepancy,
@@ -214,8 +223,6 @@ pub(in crate::explain) fn find<P: Plant>(
     let gain = gains.fold(0.0, f64::max);
     let of_law = laws.as_ref().and_then(|laws| laws.ln_evidence(discrepancy, gain));
     let none = judge.none.with_law(of_law);
-    let best = judged.iter().map(|one| one.candidate.improvement).fold(0.0, f64::max);
-    let misstated = misstated(&judge, best);
     let of_misstated: Vec<f64> = misstated.iter().map(|one| one.ln_weight).collect();
     let mut selected = decide(none, judged, &unfitted, &of_misstated);
     // What stands beside it in the answer is judged on the same data.

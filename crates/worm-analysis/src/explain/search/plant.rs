@@ -139,12 +139,12 @@ pub(in crate::explain) trait Plant: Recorded {
     fn misstatements(&self, _base: &Hypothesis) -> Vec<Misstatement> {
         Vec::new()
     }
-    /// What a law may depend on where the library does not explain the data; nothing unless the plant says so.
+    /// What a law that nobody listed may depend on; nothing unless the plant says so.
     fn laws(&self, _recalibrated: &Fit) -> Vec<Offer> {
         Vec::new()
     }
-    /// Whether such laws are weighed against the library as what else may be missing, and not only looked for where the library does not
-    /// explain the data: where the discrepancy that every model has could hide them.
+    /// Whether such laws are weighed as what else may be missing in any case, and not only where something is more probable than nothing:
+    /// where the discrepancy that every model has could hide them.
     fn weighs_laws(&self) -> bool {
         false
     }

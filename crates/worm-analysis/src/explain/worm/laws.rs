@@ -4,15 +4,18 @@
 
 use super::recorded_worm::RecordedWorm;
 use crate::explain::search::fit::Fit;
-use crate::explain::search::law::grid::{about_rest, ends, evenly, scaled, thinned, with_spacing};
+use crate::explain::search::law::grid::{about_rest, ends, evenly, from_rest, scaled, thinned, with_spacing};
 use crate::explain::search::law::offer::Offer;
 use crate::explain::search::law::shape::LawShape;
 use crate::explain::search::plant::{Plant, Recorded};
 use worm_physics::{ActsOn, Axis, Crawl, Mechanics};
 
-/// Cycles that are run before a crawl is looked at, and the parts of the one that is.
-const LEAD_CYCLES: f64 = 3.0;
+/// Cycles that are run before a crawl is followed, and the parts of each of the two that are: the first for what is remembered of it, the
+/// second to be looked at.
+const LEAD_CYCLES: f64 = 2.0;
 const PARTS: usize = 240;
+/// How far a law may remember, s: what pads and tips forget spreads over decades, and one time for each factor of four comes near to any.
+const MEMORIES_S: [f64; 4] = [0.05, 0.2, 0.8, 3.2];
 /// Points along an axis; along a place and a time, what lies between them at least: m, and cycles.
 const POINTS: usize = 9;
 const POINTS_OF_CELL: usize = 5;
@@ -35,6 +38,9 @@ struct Visited {
     rate_m_s: Vec<f64>,
     speed_m_s: Vec<f64>,
     load_n: Vec<f64>,
+    /// These two for each of [`MEMORIES_S`].
+    recent_deformation_m: [Vec<f64>; MEMORIES_S.len()],
+    recent_slide_m: [Vec<f64>; MEMORIES_S.len()],
 }
 
 /// Every law that is tried.
@@ -96,6 +102,17 @@ pub(super) fn laws(worm: &RecordedWorm<'_>, recalibrated: &Fit) -> Vec<Offer> {
         let grid = evenly_of(seen, POINTS);
         offers.extend(grid.map(|grid| offer(force, axis, None, grid, seen)));
     }
+    for (number, memory_s) in MEMORIES_S.into_iter().enumerate() {
+        let seen = &visited.recent_deformation_m[number];
+        let of_pad = evenly_of(seen, POINTS).map(|grid| offer(force, Axis::RecentDeformation, None, grid, seen));
+        let seen = &visited.recent_slide_m[number];
+        let grid = ends(seen).map(|(_, longest)| from_rest(longest));
+        let of_tip = grid.map(|grid| offer(friction, Axis::RecentSlide, None, grid, seen));
+        offers.extend(of_pad.into_iter().chain(of_tip).map(|mut offer| {
+            offer.shape.memory_s = Some(memory_s);
+            offer
+        }));
+    }
     for (axis, seen) in [
         (Axis::DeformationRate, &visited.rate_m_s),
         (Axis::Speed, &visited.speed_m_s),
@@ -134,7 +151,7 @@ pub(super) fn laws(worm: &RecordedWorm<'_>, recalibrated: &Fit) -> Vec<Offer> {
     offers
 }
 
-/// One cycle of the recalibrated crawl of a run.
+/// One cycle of the recalibrated crawl of a run, after one whose memory it has.
 fn visit(worm: &RecordedWorm<'_>, run: usize, fit: &Fit, visited: &mut Visited) {
     let observed = &worm.scene.observed[run];
     let (physics, damping) = worm.scene.physics(run, &fit.hypothesis, &fit.at);
@@ -149,21 +166,32 @@ fn visit(worm: &RecordedWorm<'_>, run: usize, fit: &Fit, visited: &mut Visited) 
         return;
     }
     let step_s = observed.cycle_s / PARTS as f64;
-    for part in 1..=PARTS {
+    let remembered = MEMORIES_S.map(|memory_s| (-step_s / memory_s).exp());
+    let mut recent_m = vec![[[0.0; 2]; MEMORIES_S.len()]; observed.cells()];
+    for part in 1..=2 * PARTS {
         let before = crawl.clone();
         let phase = LEAD_CYCLES + part as f64 / PARTS as f64;
         if crawl.advance_to(&mechanics, phase, step_s).is_err() {
             return;
         }
-        for cell in 0..observed.cells() {
+        for (cell, recent_m) in recent_m.iter_mut().enumerate() {
             let deformation_m = crawl.deformation_m(cell);
+            let strain_m = deformation_m - before.deformation_m(cell);
+            let shift_m = crawl.positions_m()[cell] - before.positions_m()[cell];
+            for (of_memory_m, left) in recent_m.iter_mut().zip(remembered) {
+                of_memory_m[0] = (of_memory_m[0] + strain_m) * left;
+                of_memory_m[1] = (of_memory_m[1] + (shift_m - strain_m).abs()) * left;
+            }
+            if part <= PARTS {
+                continue;
+            }
             visited.deformation_m.push(deformation_m);
-            visited
-                .rate_m_s
-                .push((deformation_m - before.deformation_m(cell)) / step_s);
-            visited
-                .speed_m_s
-                .push((crawl.positions_m()[cell] - before.positions_m()[cell]) / step_s);
+            visited.rate_m_s.push(strain_m / step_s);
+            visited.speed_m_s.push(shift_m / step_s);
+            for (memory, [strained_m, slid_m]) in recent_m.iter().enumerate() {
+                visited.recent_deformation_m[memory].push(*strained_m);
+                visited.recent_slide_m[memory].push(*slid_m);
+            }
             let worm = mechanics.worm();
             visited
                 .load_n

@@ -43,7 +43,7 @@ fn the_energy_balance_closes_for_every_effect_and_for_all_together() {
 fn the_energy_balance_closes_for_tables_over_every_axis() {
     for axis in Axis::ALL.into_iter().filter(|axis| !axis.is_of_motor()) {
         let width = match axis {
-            Axis::Deformation => 1e-3,
+            Axis::Deformation | Axis::RecentDeformation | Axis::RecentSlide => 1e-3,
             Axis::DeformationRate | Axis::Speed | Axis::Place => 1e-2,
             Axis::Phase => 0.3,
             Axis::Slope => 30.0,

@@ -66,7 +66,7 @@ impl Judged {
         })
     }
 
-    fn ln_weight(&self) -> f64 {
+    pub fn ln_weight(&self) -> f64 {
         self.ln_prior + self.evidence().usual
     }
 

@@ -64,6 +64,18 @@ impl FittedLaws {
     }
 }
 
+/// Of the forms of one law the first, which is the best.
+fn best_of_each(sorted: Vec<(Weighed, Fit)>) -> Vec<(Weighed, Fit)> {
+    let mut best: Vec<(Weighed, Fit)> = Vec::new();
+    for one in sorted {
+        let shape = &one.0.offer.shape;
+        if !best.iter().any(|(other, _)| other.offer.shape.is_over_the_same(shape)) {
+            best.push(one);
+        }
+    }
+    best
+}
+
 impl<P: Plant> LawSearch<'_, '_, P> {
     /// Fits the laws of most evidence, of all that the plant offers.
     pub fn fit(&self, report: &mut dyn FnMut(f64)) -> FittedLaws {
@@ -78,6 +90,7 @@ impl<P: Plant> LawSearch<'_, '_, P> {
         weighed.sort_by(|(a, _), (b, _)| b.ln_bayes.total_cmp(&a.ln_bayes));
         let best = weighed.first().map_or(0.0, |(best, _)| best.ln_bayes);
         weighed.retain(|(one, _)| one.ln_bayes > WORTH && one.ln_bayes > best - NEAR.max(0.5 * best));
+        let mut weighed = best_of_each(weighed);
         weighed.truncate(FITTED);
         let tried = weighed.len() as f64;
         let mut each: Vec<(FittedLaw, Weighed)> = Vec::new();
@@ -97,16 +110,26 @@ impl<P: Plant> LawSearch<'_, '_, P> {
             self.fit_anew(law, of);
         }
         fitted.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
-        let (law, of) = fitted.first()?;
-        if law.gain < CLAIMS {
-            return None;
-        }
-        let near = fitted[1..].iter().filter(|(other, _)| other.gain > law.gain - RIVAL);
-        let rivals = near.map(|(other, _)| Arc::clone(&other.shape)).collect();
-        let law = self.problem.plant.with_whole_law(law.clone());
+        let best = fitted.first().map(|(law, _)| law.gain).filter(|gain| *gain >= CLAIMS)?;
+        let near = fitted.into_iter().filter(|(law, _)| law.gain > best - RIVAL);
+        let mut fitted: Vec<(FittedLaw, Weighed)> = near
+            .map(|(law, of)| (self.problem.plant.with_whole_law(law), of))
+            .collect();
         report(0.8);
-        let formula = nearest(self, &law, (&of.offer, &of.scores));
-        Some(FoundLaw { law, rivals, formula })
+        let formulas = fitted
+            .iter()
+            .map(|(law, of)| nearest(self, law, (&of.offer, &of.scores)).filter(|formula| formula.gain > best - RIVAL));
+        let mut formulas: Vec<Option<Formula>> = formulas.collect();
+        // Of those that predict as well the one that is said in the fewest words; without any words, the best.
+        let words = |place: &usize| formulas[*place].as_ref().map_or(usize::MAX, |formula| formula.terms);
+        let simplest = (0..fitted.len()).min_by_key(words)?;
+        let formula = formulas.swap_remove(simplest);
+        let (law, _) = fitted.remove(simplest);
+        Some(FoundLaw {
+            law,
+            rivals: fitted.iter().map(|(other, _)| Arc::clone(&other.shape)).collect(),
+            formula,
+        })
     }
 
     /// The fit about which an offer is weighed, with derivatives, and the values of the law in it beyond neutral: those of its guess, where

@@ -15,6 +15,8 @@ use std::sync::Arc;
 
 /// Step of the derivatives by a coefficient.
 pub(super) const STEP: f64 = 0.1;
+/// Parts of the coefficients to first order from which a law is fitted, where they are nearer to the data than the whole.
+const PARTS: [f64; 3] = [0.5, 0.2, 0.05];
 /// Standard errors to either end of a 90 % interval.
 const NINETY: f64 = 1.645;
 
@@ -62,10 +64,21 @@ pub(super) fn fit_shape<P: Plant>(search: &LawSearch<'_, '_, P>, start: Start<'_
     let (problem, recalibrated) = (search.problem, search.recalibrated);
     let shape = Arc::new(start.shape);
     let hypothesis = recalibrated.hypothesis.with_law(Arc::clone(&shape), STEP);
-    let from = [&start.from.at[..], &start.at].concat();
+    // A strong law is not linear: the whole of what first order promises may be further from the data than none of it.
+    let part_of_it = |part: f64| {
+        let coefficients: Vec<f64> = start.at.iter().map(|coefficient| part * coefficient).collect();
+        problem.evaluate(&hypothesis, [&start.from.at[..], &coefficients].concat())
+    };
+    let mut nearest = part_of_it(1.0);
+    for part in PARTS {
+        let one = part_of_it(part);
+        if one.chi_squared < nearest.chi_squared {
+            nearest = one;
+        }
+    }
     let mut known = start.from.clone();
     known.jacobian.extend(start.known);
-    let mut fit = problem.fit_from(&hypothesis, from, Some(&known));
+    let mut fit = problem.fit_from(&hypothesis, nearest.at, Some(&known));
     problem.compute_jacobian(&mut fit);
     let held_out = held_out(problem, &fit, search.folds);
     let gain = search.without.chi_squared - held_out.chi_squared - problem.excess_of_repeating(recalibrated, &fit);

@@ -27,8 +27,8 @@ const AS_GOOD: f64 = 4.0;
 /// Steps along a place or a time that are tried, and time constants as a fraction of its width.
 const STEPS: usize = 12;
 const DECAYS: [f64; 3] = [0.1, 0.3, 0.7];
-/// The same of a speed and a load of a motor: friction changes near rest.
-const DECAYS_OF_MOTOR: [f64; 4] = [0.01, 0.03, 0.1, 0.3];
+/// The same of a slide, and of a speed and a load of a motor: friction changes near rest.
+const DECAYS_FROM_REST: [f64; 4] = [0.01, 0.03, 0.1, 0.3];
 /// Width of the turn of a force that has the sign of its axis, as a fraction of the largest.
 const TURN: f64 = 0.05;
 
@@ -37,6 +37,8 @@ const TURN: f64 = 0.05;
 pub(in crate::explain) struct Formula {
     /// In words and figures, in SI units.
     pub text: String,
+    /// How many terms it has.
+    pub terms: usize,
     /// Whether it says that the law is the same everywhere.
     pub is_constant: bool,
     /// Fall of the score on data held out.
@@ -156,18 +158,24 @@ fn terms(axis: Axis, grid: &[f64], period: Option<f64>) -> Vec<Term> {
             terms.extend((1..8).map(|step| Term::Step(step as f64 / 8.0)));
         }
         Axis::Slope => terms.extend([Term::Power(1), Term::Power(2)]),
-        Axis::Deformation | Axis::DeformationRate | Axis::Speed | Axis::Load => terms.extend([
-            Term::Power(1),
-            Term::Power(2),
-            Term::Magnitude,
-            Term::SignedSquare,
-            Term::Sign,
-        ]),
+        Axis::RecentSlide => {
+            terms.push(Term::Power(1));
+            terms.extend(DECAYS_FROM_REST.map(|part| Term::Decay(part * width)));
+        }
+        Axis::Deformation | Axis::DeformationRate | Axis::RecentDeformation | Axis::Speed | Axis::Load => {
+            terms.extend([
+                Term::Power(1),
+                Term::Power(2),
+                Term::Magnitude,
+                Term::SignedSquare,
+                Term::Sign,
+            ])
+        }
         Axis::OutputLoad => terms.extend([Term::Power(1), Term::Power(2), Term::Magnitude, Term::Sign]),
         // These two have no sign.
         Axis::MotorSpeed | Axis::GearLoad => {
             terms.extend([Term::Power(1), Term::Power(2)]);
-            terms.extend(DECAYS_OF_MOTOR.map(|part| Term::Decay(part * width)));
+            terms.extend(DECAYS_FROM_REST.map(|part| Term::Decay(part * width)));
         }
         Axis::MotorAngle => terms.extend([Term::Power(1), Term::Wave(TAU), Term::Wave(0.5 * TAU)]),
     }
@@ -263,6 +271,7 @@ pub(super) fn nearest<P: Plant>(
     // What the fit to the end leaves nothing of is not written.
     of_terms.retain(|(_, _, of_term)| *of_term > NEGLIGIBLE * most);
     let is_constant = of_terms.iter().all(|(term, _, _)| *term == Term::Constant);
+    let count = of_terms.len();
     // The values are those beyond neutral.
     let neutral = law.shape.acts_on.neutral();
     if neutral != 0.0 {
@@ -280,6 +289,7 @@ pub(super) fn nearest<P: Plant>(
     }
     Some(Formula {
         text,
+        terms: count,
         is_constant,
         gain: fitted.gain,
     })

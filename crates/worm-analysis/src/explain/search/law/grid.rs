@@ -1,12 +1,15 @@
 //! Points of an axis at which a law has its values, and the scale on which it is smooth.
 //!
-//! Speeds crowd about rest, so there a law may change within a fraction of the largest.
+//! Speeds and slides crowd about rest, so there a law may change within a fraction of the largest.
 
 use worm_physics::Axis;
 
 /// Speeds about which there are points, as a fraction of the largest, and that within which a law over a speed may turn.
 const NEAR_REST: [f64; 3] = [0.02, 0.07, 0.2];
 const TURN: f64 = 0.05;
+/// The same of a slide: what a tip holds at rest may be lost at once.
+const SLIDES: [f64; 7] = [0.0, 0.004, 0.012, 0.04, 0.12, 0.35, 1.0];
+const TURN_OF_SLIDE: f64 = 0.01;
 /// Most points along an axis.
 const MOST_POINTS: usize = 80;
 /// Most coordinates that are kept of where the data are.
@@ -44,14 +47,20 @@ pub(in crate::explain) fn about_rest(from: f64, to: f64) -> Vec<f64> {
     points
 }
 
+/// Points of a slide that crowd where it begins.
+pub(in crate::explain) fn from_rest(longest: f64) -> Vec<f64> {
+    SLIDES.map(|part| part * longest).to_vec()
+}
+
 /// The scale on which a law is smooth.
 pub(in crate::explain) fn scaled(axis: Axis, grid: &[f64]) -> Vec<f64> {
     let (first, last) = (grid[0], grid[grid.len() - 1]);
     let width = if grid.len() > 1 { last - first } else { 1.0 };
     match axis {
         Axis::Phase => grid.to_vec(),
-        Axis::DeformationRate | Axis::Speed | Axis::MotorSpeed => {
-            let turn = TURN * first.abs().max(last.abs());
+        Axis::DeformationRate | Axis::Speed | Axis::RecentSlide | Axis::MotorSpeed => {
+            let part = if axis == Axis::RecentSlide { TURN_OF_SLIDE } else { TURN };
+            let turn = part * first.abs().max(last.abs());
             let bent = |at: f64| (at / turn).asinh();
             let width = bent(last) - bent(first);
             grid.iter().map(|at| (bent(*at) - bent(first)) / width).collect()

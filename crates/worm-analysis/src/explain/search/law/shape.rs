@@ -15,6 +15,8 @@ pub(in crate::explain) struct LawShape {
     pub axes: Vec<(Axis, Vec<f64>)>,
     /// Of the first axis.
     pub period: Option<f64>,
+    /// How far it remembers, s, where an axis does.
+    pub memory_s: Option<f64>,
     /// The cell that it is about, from 0; all for none.
     pub cell: Option<usize>,
     /// Values with all coefficients 0.
@@ -31,6 +33,7 @@ impl LawShape {
             acts_on,
             axes,
             period: None,
+            memory_s: None,
             cell,
             centre: vec![acts_on.neutral(); points],
             columns: Vec::new(),
@@ -74,7 +77,17 @@ impl LawShape {
 
     /// The law with some coefficients; none where that is no table.
     pub fn table(&self, coefficients: &[f64]) -> Option<Table> {
-        Table::new(self.acts_on, &self.axes, self.value(coefficients), self.period).ok()
+        let table = Table::new(self.acts_on, &self.axes, self.value(coefficients), self.period).ok()?;
+        match self.memory_s {
+            Some(memory_s) => table.with_memory(memory_s).ok(),
+            None => Some(table),
+        }
+    }
+
+    /// Whether it is another form of one law: over the same axes, but remembered for another time.
+    pub fn is_over_the_same(&self, other: &Self) -> bool {
+        let axes = |shape: &Self| -> Vec<Axis> { shape.axes.iter().map(|(axis, _)| *axis).collect() };
+        (self.acts_on, self.cell) == (other.acts_on, other.cell) && axes(self) == axes(other)
     }
 
     /// The law as a setting of the physics.
