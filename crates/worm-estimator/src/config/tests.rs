@@ -227,7 +227,7 @@ fn bad_values_are_named_with_file_place_and_remedy() {
         ),
         (
             "[[effect]]\nname = \"table\"\nacts_on = \"contact-force\"\naxis = \"colour\"\ngrid = [0.0]\nvalue = [1.0]\n",
-            "effect `table`: axis \"colour\": give one of deformation, deformation-rate, speed, load, place, phase, slope, time, motor-speed, gear-load, output-load, motor-angle",
+            "effect `table`: axis \"colour\": give one of deformation, deformation-rate, recent-deformation, speed, load, place, recent-slide, phase, slope, time, motor-speed, gear-load, output-load, motor-angle",
         ),
         (
             "[[effect]]\nname = \"table\"\nacts_on = \"contact-force\"\naxis = \"place\"\ngrid = [0.1, 0.0]\nvalue = [1.0, 2.0]\n",

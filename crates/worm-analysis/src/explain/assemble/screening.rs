@@ -41,8 +41,7 @@ fn screening(found: &Found) -> Vec<Screened> {
         .iter()
         .map(|screening| {
             let candidate = found
-                .selected
-                .all
+                .fitted
                 .iter()
                 .find(|candidate| candidate.hypothesised == [screening.hypothesised]);
             Screened {

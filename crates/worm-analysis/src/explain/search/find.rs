@@ -4,7 +4,7 @@ use super::discrepancy::Discrepancy;
 use super::fit::Fit;
 use super::held_out::HeldOut;
 use super::judge::candidate::{Candidate, kinds};
-use super::judge::decision::{Judged, Selected, decide};
+use super::judge::decision::{Selected, decide};
 use super::judge::evidence::{InTime, evidence};
 use super::judge::prior;
 use super::judgement::{FALSE_NAMES, Judge, WORTH_A_LOOK, held_out};
@@ -17,6 +17,7 @@ use super::plant::Plant;
 use super::problem::FitProblem;
 use super::refit::{REFITTED, alone, pair_up, refit};
 use super::score_test::{self, Expected, Screening};
+use crate::explain::answer::Verdict;
 
 /// Single effects from which pairs are tried.
 const PAIR_SEEDS: usize = 2;
@@ -77,6 +78,8 @@ pub(in crate::explain) struct Found {
     /// Names of the effects that the user left out.
     pub left_out: Vec<&'static str>,
     pub selected: Selected,
+    /// Every effect and pair that was fitted.
+    pub fitted: Vec<Candidate>,
     /// Fraction of the gap that the best candidate leaves open.
     pub open_share: f64,
     /// Improvement that the best of the library reaches by chance in one campaign of a hundred.
@@ -190,23 +193,20 @@ pub(in crate::explain) fn find<P: Plant>(
     let recalibrated_held_out = held_out(problem, recalibrated, &folds);
     report("judgement", 0.9);
     let judged = judge.judge(candidates, pairs, &chance, &folds, &recalibrated_held_out);
-    let fitted: Vec<&Hypothesised> = judged.iter().flat_map(|one| &one.candidate.hypothesised).collect();
+    let tried: Vec<&Hypothesised> = judged.iter().flat_map(|one| &one.candidate.hypothesised).collect();
     // What the rough fits dismissed counts by its prior at most: first order promises strong effects too much.
     let unfitted: Vec<f64> = screened
         .iter()
-        .filter(|screening| !fitted.contains(&&screening.hypothesised))
+        .filter(|screening| !tried.contains(&&screening.hypothesised))
         .map(|screening| judge.none.usual + judge.ln_prior(&[screening.hypothesised]) + screening.ln_bayes.min(0.0))
         .collect();
     let best = judged.iter().map(|one| one.candidate.improvement).fold(0.0, f64::max);
     let misstated = misstated(&judge, best);
+    let of_misstated: Vec<f64> = misstated.iter().map(|one| one.ln_weight).collect();
+    let mut selected = decide(judge.none, &judged, &unfitted, &of_misstated);
     // What nobody listed can look like an effect or like wrong conditions, and may be what is missing as well as they.
-    let ln_none = prior::NONE.ln() + judge.none.usual;
-    let of_answers = judged
-        .iter()
-        .map(Judged::ln_weight)
-        .chain(misstated.iter().map(|one| one.ln_weight));
-    let is_something = of_answers.fold(f64::NEG_INFINITY, f64::max) > ln_none;
-    let laws = (is_something || plant.weighs_laws()).then(|| {
+    let has_answer = matches!(selected.verdict, Verdict::Explained | Verdict::Ambiguous) || selected.is_misstated();
+    let laws = (has_answer || plant.weighs_laws()).then(|| {
         let search = LawSearch {
             problem,
             discrepancy,
@@ -222,9 +222,9 @@ pub(in crate::explain) fn find<P: Plant>(
         .filter_map(|one| Some(recalibrated_held_out.chi_squared - one.candidate.held_out.as_ref()?.chi_squared));
     let gain = gains.fold(0.0, f64::max);
     let of_law = laws.as_ref().and_then(|laws| laws.ln_evidence(discrepancy, gain));
-    let none = judge.none.with_law(of_law);
-    let of_misstated: Vec<f64> = misstated.iter().map(|one| one.ln_weight).collect();
-    let mut selected = decide(none, judged, &unfitted, &of_misstated);
+    if of_law.is_some() {
+        selected = decide(judge.none.with_law(of_law), &judged, &unfitted, &of_misstated);
+    }
     // What stands beside it in the answer is judged on the same data.
     if let Some(wrong) = &mut selected.best_wrong
         && wrong.held_out.is_none()
@@ -250,6 +250,7 @@ pub(in crate::explain) fn find<P: Plant>(
         screened,
         left_out: options.without.clone(),
         selected,
+        fitted: judged.into_iter().map(|one| one.candidate).collect(),
         open_share,
         threshold,
         laws,

@@ -143,8 +143,8 @@ pub(in crate::explain) trait Plant: Recorded {
     fn laws(&self, _recalibrated: &Fit) -> Vec<Offer> {
         Vec::new()
     }
-    /// Whether such laws are weighed as what else may be missing in any case, and not only where something is more probable than nothing:
-    /// where the discrepancy that every model has could hide them.
+    /// Whether such laws are weighed as what else may be missing in any case, and not only where the answer would be an effect or wrong
+    /// conditions: where the discrepancy that every model has could hide them.
     fn weighs_laws(&self) -> bool {
         false
     }

@@ -185,7 +185,7 @@ fn stages(
     law: Option<&FittedLaw>,
 ) -> Vec<ServoStage> {
     let servo = problem.plant;
-    let (found, selected) = (&parts.found, &parts.found.selected);
+    let found = &parts.found;
     let measured = Stages::new(servo, &parts.folds);
     let names = |candidate: &Candidate| {
         let names: Vec<&str> = candidate.named().map(|(_, one)| one.effect.name).collect();
@@ -211,7 +211,7 @@ fn stages(
         let all = named.first().map_or(&[][..], |first| &first.hypothesised);
         single.hypothesised.iter().all(|one| all.contains(one))
     };
-    let singles = || selected.all.iter().filter(|one| one.hypothesised.len() == 1);
+    let singles = || found.fitted.iter().filter(|one| one.hypothesised.len() == 1);
     let is_pair = named.first().is_some_and(|first| first.named().count() > 1);
     let mut steps: Vec<ServoStage> = singles()
         .filter(|single| is_pair && is_named(single))

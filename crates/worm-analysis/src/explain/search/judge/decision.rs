@@ -66,7 +66,7 @@ impl Judged {
         })
     }
 
-    pub fn ln_weight(&self) -> f64 {
+    fn ln_weight(&self) -> f64 {
         self.ln_prior + self.evidence().usual
     }
 
@@ -114,8 +114,6 @@ pub(in crate::explain) struct Selected {
     pub change: Option<Change>,
     /// The best effect of another kind than what is named; where nothing is, the nearest.
     pub best_wrong: Option<Candidate>,
-    /// Every effect and pair that was fitted.
-    pub all: Vec<Candidate>,
 }
 
 impl Selected {
@@ -133,7 +131,7 @@ struct Class {
 
 /// Reaches the verdict. `none` is the evidence without effects, `unfitted` the logarithm of the weights of effects that were only
 /// screened, `misstated` those of conditions that are stated wrongly.
-pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: &[f64], misstated: &[f64]) -> Selected {
+pub(in crate::explain) fn decide(none: Evidence, judged: &[Judged], unfitted: &[f64], misstated: &[f64]) -> Selected {
     let singles = judged.iter().filter(|one| !one.is_pair());
     let best_single = singles.max_by(|a, b| a.ln_weight().total_cmp(&b.ln_weight()));
     // An effect whose law is a little wrong is no reason for another law.
@@ -253,7 +251,6 @@ pub(in crate::explain) fn decide(none: Evidence, judged: Vec<Judged>, unfitted: 
         misstated_probability,
         change: change(none, &standing),
         best_wrong,
-        all: judged.into_iter().map(|one| one.candidate).collect(),
     }
 }
 

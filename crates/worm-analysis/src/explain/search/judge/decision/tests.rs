@@ -67,7 +67,7 @@ fn judged(names: &[&str], ln_bayes: f64, large: f64) -> Judged {
 }
 
 fn verdict(none_large: f64, all: Vec<Judged>) -> Selected {
-    decide(of(NONE_AT, NONE_AT + none_large), all, &[], &[])
+    decide(of(NONE_AT, NONE_AT + none_large), &all, &[], &[])
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn wrong_conditions_count_as_much_as_they_are_probable() {
     let beside = |ln_bayes: f64| {
         let effect = judged(&["pad-creep"], 40.0, 20.0);
         let with_prior = NONE_AT + ln_bayes + effect.ln_prior;
-        decide(of(NONE_AT, NONE_AT + 5.0), vec![effect], &[], &[with_prior])
+        decide(of(NONE_AT, NONE_AT + 5.0), &[effect], &[], &[with_prior])
     };
     let [much_less, less, more] = [30.0, 39.0, 50.0].map(beside);
     assert_eq!(much_less.verdict, Verdict::Explained);
@@ -218,7 +218,7 @@ fn a_large_discrepancy_is_something_else_alone_and_beside_an_effect() {
 fn a_law_that_is_more_probable_than_every_effect_is_outside_the_library() {
     let with = |ln_law: f64, ln_bayes: f64| {
         let none = of(NONE_AT, NONE_AT - 10.0).with_law(Some(NONE_AT + ln_law));
-        decide(none, vec![judged(&["pad-creep"], ln_bayes, 20.0)], &[], &[]).verdict
+        decide(none, &[judged(&["pad-creep"], ln_bayes, 20.0)], &[], &[]).verdict
     };
     assert_eq!(with(80.0, 40.0), Verdict::OutsideLibrary);
     assert_eq!(with(30.0, 40.0), Verdict::Explained);
