@@ -82,17 +82,20 @@ fn a_command_is_as_old_as_its_button_and_a_hold_voids_what_was_asked_before_it()
 
 #[test]
 fn what_was_pressed_while_the_line_was_down_is_not_done_when_it_is_back() {
-    let watched = Watched::start("d-line");
-    watched.arm(ANN);
-    let line = Line::to(watched.address);
     let Some(browser) = Browser::start(900, 800) else {
         return;
     };
+    let watched = Watched::start("d-line");
+    let line = Line::to(watched.address);
     browser.open(&format!("http://{}/#token={TOKEN}", line.address));
     let page_is_fresh =
         "!document.getElementById('crawl').disabled && document.getElementById('drive').checkVisibility()";
-    browser.wait_for(page_is_fresh);
     let press = |button: &str| browser.run(&format!("document.getElementById('{button}').click()"));
+    browser.wait_for(page_is_fresh);
+    // Not before: a browser that starts may take the computer from a worm for so long that it loses its servo.
+    press("arm");
+    watched.wait_for_mode("armed");
+    browser.wait_for(page_is_fresh);
     let rest = || {
         assert_eq!(
             request(watched.address, "POST", "/api/command/hold", &[], "").status,
