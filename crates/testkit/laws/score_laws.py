@@ -6,8 +6,8 @@
 
 Of a worm with an effect of the library, that effect and its twins are left out of the search, or the whole library (--library): the law
 should depend on what the effect depends on (AXES), and predict the run between the slopes as well as the effect itself does, by the full
-search's model (not fitted where the whole library is left out). The closure on that run is the fraction of the squared error of the recalibrated model (the law taken away, calibration kept) that is closed, down
-to the squared noise. A worm with a stranger should be detected as outside; a clean one should have no law.
+search's model (not fitted where the whole library is left out). The closure on that run is the fraction of the squared error of the
+recalibrated model (the law taken away, calibration kept) that is closed, down to the squared noise. A worm with a stranger should be detected as outside; a clean one should have no law.
 """
 
 import argparse

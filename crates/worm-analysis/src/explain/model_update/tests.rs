@@ -372,7 +372,18 @@ fn a_law_is_written_as_a_table_and_read_back() {
         value: vec![0.0, 0.1, 0.2, -0.3, 0.0, 0.5],
         ..one.clone()
     };
-    for law in [one, two] {
+    let remembered = FoundLaw {
+        over: LawOver {
+            axis: LawAxes::One("recent-slide"),
+            cell: None,
+            period: None,
+            memory_s: Some(0.2),
+            ..one.over.clone()
+        },
+        grid: LawAxes::One(vec![0.0, 1e-3, 5e-3]),
+        ..one.clone()
+    };
+    for law in [one, two, remembered] {
         let answer = Answer {
             law: Some(law.clone()),
             ..answer(Verdict::OutsideLibrary, &[], &[], &[])
@@ -382,7 +393,7 @@ fn a_law_is_written_as_a_table_and_read_back() {
         let settings = config.effect_settings().expect("it was checked");
         let table = settings[0].table().expect("a table");
         assert_eq!(settings[0].cell().map(|cell| cell + 1), law.over.cell);
-        assert_eq!(table.period(), law.over.period);
+        assert_eq!((table.period(), table.memory_s()), (law.over.period, law.over.memory_s));
         let axes: Vec<&str> = table.axes().map(worm_physics::Axis::name).collect();
         assert_eq!(axes, law.over.axis.all().into_iter().copied().collect::<Vec<_>>());
         let values = table.value().iter().zip(&law.value);
