@@ -1,7 +1,7 @@
 //! What the page about all worms says of robots and worms that nobody reaches, and that names which are taken stay taken.
 
 use super::http::{Reply, request};
-use super::worm::{Process, wait_for};
+use super::process::{Process, wait_for};
 use super::{Laptop, PATIENCE, Robot, bridge_toml, free_port, make_keys, path};
 use nix::sys::signal::Signal;
 use serde_json::Value;

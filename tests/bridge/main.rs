@@ -5,6 +5,12 @@ mod fleet_page;
 #[allow(dead_code, reason = "of another test binary, without its browser")]
 mod http;
 mod network;
+#[path = "../processes/process.rs"]
+#[allow(
+    dead_code,
+    reason = "the harness of another test binary, of which this one uses a part"
+)]
+mod process;
 mod record;
 mod refusals;
 mod second_bridge;
@@ -18,13 +24,14 @@ mod watcher;
 mod worm;
 
 use network::{ROBOT, TwoComputers};
+use process::{Invocation, Process, wait_for};
 use serde_json::{Value, json};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 use watcher::Watcher;
-use worm::{Invocation, Process, Worm, wait_for};
+use worm::Worm;
 use worm_estimator::message::{CommandKind, CommandOutcome, Mode};
 use zenoh::Wait;
 

@@ -1,6 +1,6 @@
 //! A worm has one bridge, and who starts another one hears which it is.
 
-use super::worm::Process;
+use super::process::Process;
 use super::{PATIENCE, Robot, bridge_toml, free_port, path};
 
 #[test]

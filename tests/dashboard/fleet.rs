@@ -2,8 +2,9 @@
 
 use super::PATIENCE;
 use super::http::{Browser, request};
+use super::process::{Process, wait_for};
 use super::watched::{slow_worm, start};
-use super::worm::{Process, Worm, wait_for};
+use super::worm::Worm;
 use nix::sys::signal::Signal;
 use serde_json::json;
 

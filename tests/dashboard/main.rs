@@ -6,6 +6,12 @@ mod fleet;
 mod frozen;
 mod held_up;
 mod http;
+#[path = "../processes/process.rs"]
+#[allow(
+    dead_code,
+    reason = "the harness of another test binary, of which this one uses a part"
+)]
+mod process;
 mod watched;
 mod without_tracker;
 #[path = "../processes/worm.rs"]
@@ -17,13 +23,14 @@ mod worm;
 
 use http::{Browser, request};
 use nix::sys::signal::Signal;
+use process::wait_for;
 use serde_json::{Value, json};
 use std::io::Write;
 use std::net::TcpStream;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use watched::{Watched, events, start};
-use worm::{Worm, wait_for};
+use worm::Worm;
 
 const TOKEN: &str = "a-token-for-tests-0123";
 const BEARER: &str = "Authorization: Bearer a-token-for-tests-0123";

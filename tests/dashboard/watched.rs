@@ -1,7 +1,8 @@
 //! A worm with a dashboard, as all of these tests have one, and what the dashboard tells.
 
 use super::http::{Reply, request};
-use super::worm::{Process, Worm, wait_for};
+use super::process::{Process, wait_for};
+use super::worm::Worm;
 use super::{BEARER, PATIENCE, TOKEN};
 use nix::sys::signal::Signal;
 use serde_json::Value;

@@ -3,6 +3,12 @@
 //! `WORMD_PYTHON` names an interpreter with websockets and protobuf (default `python3`); without one the test of the stream says so and
 //! passes.
 
+#[path = "../processes/process.rs"]
+#[allow(
+    dead_code,
+    reason = "the harness of another test binary, of which this one uses a part"
+)]
+mod process;
 #[path = "../processes/worm.rs"]
 #[allow(
     dead_code,

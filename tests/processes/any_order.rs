@@ -1,6 +1,7 @@
 //! Processes of a worm are killed, suspended and restarted in any order; it always crawls again, and nothing is left behind.
 
-use super::worm::{Process, Worm, wait_for};
+use super::process::{Process, wait_for};
+use super::worm::Worm;
 use super::{Crawling, PATIENCE};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -1,7 +1,8 @@
 //! Who watches over a crawl, and what the worm does when nobody does any more.
 
 use super::any_order::make_crawl_again;
-use super::worm::{Process, Worm, wait_for};
+use super::process::{Process, wait_for};
+use super::worm::Worm;
 use super::{Crawling, PATIENCE};
 use nix::pty::{OpenptyResult, Winsize, openpty};
 use nix::sys::signal::Signal;

@@ -1,6 +1,7 @@
 //! The black box with real processes: a box around a stop, a black box that is killed while it writes, and one that cannot write.
 
-use super::worm::{Worm, wait_for};
+use super::process::wait_for;
+use super::worm::Worm;
 use super::{Crawling, PATIENCE};
 use std::path::PathBuf;
 use worm_estimator::message::{AlarmKind, CommandKind, Estimate, Mode, RecordingProblem};

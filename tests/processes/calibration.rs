@@ -1,7 +1,8 @@
 //! `wormd calibrate` on a running worm whose gears are not as configured.
 
 use super::PATIENCE;
-use super::worm::{Worm, wait_for};
+use super::process::wait_for;
+use super::worm::Worm;
 use nix::sys::signal::Signal;
 use worm_estimator::config::{CalibrationMode, Config};
 use worm_estimator::message::Mode;

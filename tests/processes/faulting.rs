@@ -1,7 +1,8 @@
 //! Faults of a running virtual worm, switched by `wormd fault`.
 
 use super::PATIENCE;
-use super::worm::{Worm, wait_for};
+use super::process::wait_for;
+use super::worm::Worm;
 use worm_estimator::message::{CommandKind, CommandOutcome, Fault, Mode};
 
 fn fault(worm: &Worm, arguments: &[&str]) -> (Option<i32>, String, String) {

@@ -1,6 +1,7 @@
 //! Self-sensing in a running worm: what `up` says, a mark, an alarm by the current alone, and the same again from the recording.
 
-use super::worm::{Worm, wait_for};
+use super::process::wait_for;
+use super::worm::Worm;
 use super::{Crawling, PATIENCE};
 use serde_json::Value;
 use std::process::Output;

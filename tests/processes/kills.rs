@@ -4,7 +4,8 @@
 //! while the computer does. `WORMD_KILLS` sets the number of kills (500 for the long run), `WORMD_SEED` the seed.
 
 use super::attending::stalled_terminal;
-use super::worm::{Process, Worm, wait_for};
+use super::process::{Process, wait_for};
+use super::worm::Worm;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use rand::{RngExt, SeedableRng};

@@ -1,6 +1,7 @@
 //! Processes that come and go, in order or killed, leave nothing with those that stay.
 
-use super::worm::{Process, Worm, wait_for};
+use super::process::{Process, wait_for};
+use super::worm::Worm;
 use super::{Crawling, PATIENCE};
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -1,7 +1,8 @@
 //! The terminal of `wormd up` may vanish; the worm must not crawl on unattended.
 
 use super::PATIENCE;
-use super::worm::{Worm, wait_for};
+use super::process::wait_for;
+use super::worm::Worm;
 use nix::fcntl::{FcntlArg, FdFlag, fcntl};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use nix::pty::{Winsize, openpty};

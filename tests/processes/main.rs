@@ -15,6 +15,7 @@ mod kills;
 mod latency;
 mod leaks;
 mod leaving;
+mod process;
 mod python_package;
 mod recording;
 mod recording_stops;
@@ -25,9 +26,10 @@ mod watching;
 mod without_tracker;
 mod worm;
 
+use process::{Process, wait_for};
 use std::time::Duration;
 use testkit::process_pauses::Pause;
-use worm::{Process, Worm, late_ticks, soon, wait_for};
+use worm::{Worm, late_ticks, soon};
 use worm_estimator::message::{AlarmKind, CommandKind, CommandOutcome, Fault, Mode};
 use wormd::link::servo::{WATCHDOG_LATCHED, register};
 

@@ -1,6 +1,7 @@
 //! The recorder beside a real worm.
 
-use super::worm::{Worm, wait_for};
+use super::process::wait_for;
+use super::worm::Worm;
 use super::{Crawling, PATIENCE};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,7 @@
 //! A recording that is bounded, and one that cannot go on: the worm crawls on, and an alarm says so.
 
-use super::worm::{Worm, wait_for};
+use super::process::wait_for;
+use super::worm::Worm;
 use super::{Crawling, PATIENCE};
 use std::path::PathBuf;
 use worm_estimator::message::{Alarm, AlarmKind, Estimate, Mode, RecordingProblem};

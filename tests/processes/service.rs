@@ -1,6 +1,7 @@
 //! What a service manager hears of the processes, at a real notification socket, with `WATCHDOG_USEC` as systemd sets it.
 
-use super::worm::{Invocation, Process, Worm, wait_for};
+use super::process::{Invocation, Process, wait_for};
+use super::worm::Worm;
 use super::{PATIENCE, any_order::make_crawl_again};
 use std::os::unix::net::UnixDatagram;
 use std::process::Command;

@@ -1,6 +1,7 @@
 //! `wormd command stop` works when nothing else does.
 
-use super::worm::{Worm, wait_for};
+use super::process::wait_for;
+use super::worm::Worm;
 use super::{Crawling, PATIENCE};
 use nix::sys::signal::Signal;
 use std::os::unix::process::CommandExt;

@@ -1,7 +1,8 @@
 //! A trip as a process: it makes the worm crawl out and home, is one at a time, and leaves a worm that holds when it is killed.
 
 use super::PATIENCE;
-use super::worm::{Worm, wait_for};
+use super::process::wait_for;
+use super::worm::Worm;
 use std::time::Duration;
 use worm_estimator::message::{CommandKind, CommandOutcome, Mode};
 

@@ -2,7 +2,8 @@
 
 use super::any_order::make_crawl_again;
 use super::attending::{COLUMNS, ROWS, stalled_terminal};
-use super::worm::{Process, Worm, wait_for};
+use super::process::{Process, wait_for};
+use super::worm::Worm;
 use super::{Crawling, PATIENCE};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;

@@ -260,6 +260,11 @@ impl Crawl {
         self.cell[..self.cells][cell].pad.force_n
     }
 
+    /// Gait phase at which it began: cycles are counted from there.
+    pub fn first_phase(&self) -> f64 {
+        self.first_phase
+    }
+
     /// Gait phase, cycles, unwrapped.
     pub fn phase(&self) -> f64 {
         self.phase

@@ -55,7 +55,7 @@ impl Grid {
             Some(period) => points[0] + (at - points[0]).rem_euclid(period),
             None => at,
         };
-        let after = points.partition_point(|point| *point <= at);
+        let after = self.points_up_to(at);
         match (after, self.period) {
             (0, _) => (0, 0, 0.0, 0.0),
             (after, None) if after > last => (last, last, 0.0, 0.0),
@@ -67,6 +67,18 @@ impl Grid {
                 let way = points[after] - points[after - 1];
                 (after - 1, after, (at - points[after - 1]) / way, way.recip())
             }
+        }
+    }
+
+    /// How many points are at a coordinate or before it. Most grids are even, so that is tried first.
+    fn points_up_to(&self, at: f64) -> usize {
+        let (points, last) = (&self.at, self.at.len() - 1);
+        let evenly = (at - points[0]) / (points[last] - points[0]) * last as f64;
+        let before = (evenly as usize).min(last - 1);
+        if points[before] <= at && at < points[before + 1] {
+            before + 1
+        } else {
+            points.partition_point(|point| *point <= at)
         }
     }
 }

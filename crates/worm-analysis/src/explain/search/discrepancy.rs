@@ -19,7 +19,7 @@
 //! score and held-out likelihood is taken of that. Other scales follow from the products with Q.
 
 use super::bins::Bins;
-use crate::least_squares::cross;
+use crate::least_squares::{cross, dot};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -35,6 +35,9 @@ const OVER_CONDITIONS: [f64; 2] = [0.7, 0.3];
 pub(in crate::explain) const SLOW: f64 = 0.3;
 pub(in crate::explain) const WAVES: [f64; 2] = [0.85, 0.5];
 const SLOW_COSINES: usize = 3;
+/// Rows and directions that one thread takes at once.
+const ROWS_AT_ONCE: usize = 8192;
+const DIRECTIONS_AT_ONCE: usize = 24;
 /// Strength of a direction at a₀, in variances of the noise, below which it is left out.
 const NEGLIGIBLE: f64 = 0.02;
 
@@ -83,11 +86,16 @@ impl Discrepancy {
         for (along, strength) in along.iter_mut().zip(&self.strengths) {
             *along *= (1.0 + strength).sqrt().recip() - 1.0;
         }
-        for (direction, along) in self.directions.column_iter().zip(&along) {
-            for (row, direction) in rows.iter_mut().zip(direction.iter()) {
-                *row += along * direction;
+        let of_chunk = |(number, rows): (usize, &mut [f64])| {
+            let from = number * ROWS_AT_ONCE;
+            for (direction, along) in self.directions.column_iter().zip(&along) {
+                let direction = &direction.as_slice()[from..from + rows.len()];
+                for (row, direction) in rows.iter_mut().zip(direction) {
+                    *row += along * direction;
+                }
             }
-        }
+        };
+        rows.par_chunks_mut(ROWS_AT_ONCE).enumerate().for_each(of_chunk);
     }
 
     /// Whitens columns of rows, all at once.
@@ -101,8 +109,9 @@ impl Discrepancy {
 
     /// Products of rows with every direction.
     pub fn products(&self, rows: &[f64]) -> DVector<f64> {
-        let columns = self.directions.column_iter();
-        let products = columns.map(|direction| crate::least_squares::dot(direction.as_slice(), rows, None));
+        let count = self.directions.ncols();
+        let along = |number: usize| dot(self.directions.column(number).as_slice(), rows, None);
+        let products = (0..count).into_par_iter().with_min_len(DIRECTIONS_AT_ONCE).map(along);
         DVector::from_vec(products.collect())
     }
 

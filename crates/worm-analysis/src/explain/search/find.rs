@@ -136,9 +136,7 @@ pub(in crate::explain) fn find<P: Plant>(
     );
     report("refit", 0.3);
     let nominal = problem.with_derivatives(&recalibrated.hypothesis, recalibrated.hypothesis.neutral());
-    let mut candidates = refit(problem, recalibrated, &nominal, &screened, REFITTED, &mut |fraction| {
-        report("refit", 0.3 + 0.35 * fraction)
-    });
+    let mut candidates = refit(problem, recalibrated, &nominal, &screened, REFITTED);
     judge.weigh(&mut candidates, &screened);
     let best = candidates.first().filter(|best| judge.ln_odds(best) > 0.0);
     let best = best.and_then(|best| best.evidence).unwrap_or(judge.none);

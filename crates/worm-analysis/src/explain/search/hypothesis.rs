@@ -1,7 +1,7 @@
 //! A hypothesis about a plant: which effects act on it, and which quantities are free.
 
-use super::law::shape::LawShape;
-use super::parameter::{Free, Hypothesised, What};
+use super::law::shape::{Acts, LawShape};
+use super::parameter::{Free, Hypothesised, Onset, What};
 use crate::least_squares::Quantity;
 use std::sync::Arc;
 use worm_physics::effect::Setting;
@@ -48,17 +48,26 @@ impl Hypothesis {
         self.free.iter().map(|free| free.quantity).collect()
     }
 
-    /// The effects with these values.
+    /// The effects with these values, and the law.
     pub fn settings(&self, at: &[f64]) -> Vec<Setting> {
-        self.settings_of(at, |_| true)
+        let law = self.law_setting(0.0, at);
+        self.effects_of(at, |_| true).chain(law).collect()
     }
 
-    /// The effects that act so many cycles after the start of a run.
-    pub fn settings_at(&self, run: usize, cycle: f64, at: &[f64]) -> Vec<Setting> {
-        self.settings_of(at, |one| one.onset.is_none_or(|onset| onset.acts_at(run, cycle)))
+    /// What acts so many cycles after the start of a run, in a crawl that counts its cycles from so many after it.
+    pub fn settings_at(&self, run: usize, cycle: f64, counted_from: f64, at: &[f64]) -> Vec<Setting> {
+        let acts = |onset: Onset| onset.acts_at(run, cycle);
+        let law = match self.law_acts(at) {
+            Acts::Never => None,
+            Acts::Within(onset) if !acts(onset) => None,
+            Acts::Within(_) | Acts::Throughout => self.law_setting(counted_from, at),
+        };
+        self.effects_of(at, |one| one.onset.is_none_or(acts))
+            .chain(law)
+            .collect()
     }
 
-    fn settings_of(&self, at: &[f64], acts: impl Fn(&Hypothesised) -> bool) -> Vec<Setting> {
+    fn effects_of(&self, at: &[f64], acts: impl Fn(&Hypothesised) -> bool) -> impl Iterator<Item = Setting> {
         let mut values: Vec<Vec<f64>> = self
             .hypothesised
             .iter()
@@ -70,15 +79,19 @@ impl Hypothesis {
             }
         }
         let effects = self.hypothesised.iter().zip(values);
-        let acting = effects.filter(|(hypothesised, _)| acts(hypothesised));
-        let law = self
-            .law
-            .iter()
-            .filter_map(|law| law.setting(&self.law_coefficients(at)));
-        acting
-            .map(|(hypothesised, values)| Setting::within(hypothesised.effect, hypothesised.cell, &values))
-            .chain(law)
-            .collect()
+        let acting = effects.filter(move |(hypothesised, _)| acts(hypothesised));
+        acting.map(|(hypothesised, values)| Setting::within(hypothesised.effect, hypothesised.cell, &values))
+    }
+
+    fn law_setting(&self, counted_from: f64, at: &[f64]) -> Option<Setting> {
+        let law = LawShape::clone(self.law.as_deref()?).counted_from(counted_from);
+        law.setting(&self.law_coefficients(at))
+    }
+
+    /// When the law acts.
+    fn law_acts(&self, at: &[f64]) -> Acts {
+        let law = self.law.as_ref();
+        law.map_or(Acts::Never, |law| law.acts(&self.law_coefficients(at)))
     }
 
     /// The coefficients of the law.
@@ -88,9 +101,13 @@ impl Hypothesis {
         of_law.map(|(_, &value)| value).collect()
     }
 
-    /// Where effects of a run begin or end after its start, cycles since then, in this order.
-    pub fn changes_at(&self, run: usize) -> Vec<f64> {
-        let onsets = self.hypothesised.iter().filter_map(|one| one.onset);
+    /// Where what acts on a run begins or ends after its start, cycles since then, in this order.
+    pub fn changes_at(&self, run: usize, at: &[f64]) -> Vec<f64> {
+        let of_law = match self.law_acts(at) {
+            Acts::Within(onset) => Some(onset),
+            Acts::Never | Acts::Throughout => None,
+        };
+        let onsets = self.hypothesised.iter().filter_map(|one| one.onset).chain(of_law);
         let of_run = onsets.filter(|onset| onset.is_in(run));
         let mut all: Vec<f64> = of_run
             .flat_map(|onset| onset.begins.into_iter().chain(onset.ends))

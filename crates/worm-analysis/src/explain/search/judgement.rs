@@ -14,6 +14,7 @@ use super::parameter::{Hypothesised, What};
 use super::plant::Plant;
 use super::problem::FitProblem;
 use super::score_test::Screening;
+use rayon::prelude::*;
 
 /// Fraction of machines without an effect, and without a second one, for which the best of the library may pass.
 pub(in crate::explain) const FALSE_NAMES: f64 = 0.01;
@@ -151,7 +152,7 @@ impl<P: Plant> Judge<'_, P> {
             .filter(|(one, _)| one.hypothesised.len() == 1)
             .map(|(one, _)| one.clone())
             .collect();
-        all.into_iter()
+        all.into_par_iter()
             .map(|(mut candidate, mut beyond_chance)| {
                 let ln_prior = self.ln_prior(&candidate.hypothesised);
                 let is_near = beyond_chance > 0.0

@@ -9,6 +9,7 @@ use super::judge::prior::{MISSTATED, MISSTATED_RUN, UNLIKE_RUN};
 use super::judgement::Judge;
 use super::misstatement::{Misstatement, Sort};
 use super::plant::Plant;
+use rayon::prelude::*;
 
 /// Improvement over the recalibrated model from which it is worth looking for a mistake, and that one must reach.
 const LEAST_IMPROVEMENT: f64 = 10.0;
@@ -51,7 +52,7 @@ pub(in crate::explain) fn misstated(judge: &Judge<'_, impl Plant>, best_improvem
         prior_of_all(sort) / of_sort as f64
     };
     let mut starts: Vec<(Misstatement, f64)> = all
-        .into_iter()
+        .into_par_iter()
         .map(|one| {
             let chi_squared = problem.evaluate(&one.hypothesis, one.start.clone()).chi_squared;
             (one, chi_squared)
@@ -59,11 +60,13 @@ pub(in crate::explain) fn misstated(judge: &Judge<'_, impl Plant>, best_improvem
         .filter(|(_, chi_squared)| chi_squared.is_finite())
         .collect();
     starts.sort_by(|a, b| a.0.sort.cmp(&b.0.sort).then(a.1.total_cmp(&b.1)));
-    let best = starts
+    let best: Vec<&Misstatement> = starts
         .chunk_by(|a, b| a.0.sort == b.0.sort)
-        .flat_map(|of_sort| &of_sort[..of_sort.len().min(FITTED)]);
+        .flat_map(|of_sort| of_sort.iter().map(|(one, _)| one).take(FITTED))
+        .collect();
     let mut found: Vec<Misstated> = best
-        .filter_map(|(one, _)| {
+        .into_par_iter()
+        .filter_map(|one| {
             let mut fit = problem.fit(&one.hypothesis, one.start.clone(), None);
             let improvement = judge.recalibrated.chi_squared
                 - fit.chi_squared

@@ -111,7 +111,7 @@ pub(in crate::explain) fn with_onsets(
             promising.retain(|one| one.ln_odds(judge) > 0.0);
         }
         let promising = try_out(judge, &base, promising, count);
-        refit(judge.problem, &base, nominal, &promising, count, &mut |_| ())
+        refit(judge.problem, &base, nominal, &promising, count)
     });
     let mut candidates: Vec<Candidate> = fitted
         .flatten()

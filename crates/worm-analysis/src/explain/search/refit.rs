@@ -46,7 +46,6 @@ pub(in crate::explain) fn refit(
     nominal: &Fit,
     screened: &[Screening],
     max: usize,
-    progress: &mut dyn FnMut(f64),
 ) -> Vec<Candidate> {
     let effects_from = base.at.len() - score_test::effect_quantities(&base.hypothesis);
     let hypothesis_of = |hypothesised: Hypothesised| {
@@ -55,12 +54,10 @@ pub(in crate::explain) fn refit(
         Hypothesis::new(&base.hypothesis.free[..effects_from], &all)
     };
     let nominal_normal = nominal.normal(None);
-    let mut rough: Vec<Fit> = Vec::with_capacity(screened.len());
-    for (done, screening) in screened.iter().take(ROUGHLY).enumerate() {
-        progress(0.5 * done as f64 / ROUGHLY as f64);
+    let roughly = |screening: &Screening| {
         let hypothesis = hypothesis_of(screening.hypothesised);
         let about_base = screening.starts.iter().map(|start| (base, start.clone()));
-        let strong = score_test::strong(screening.hypothesised.effect, &STRONG).into_par_iter();
+        let strong = score_test::strong(screening.hypothesised.effect, &STRONG).into_iter();
         let recalibrated = strong.map(|start| {
             let at = [&nominal.at[..], &start].concat();
             problem.step_of_first(problem.evaluate(&hypothesis, at), &nominal.jacobian, &nominal_normal)
@@ -78,19 +75,19 @@ pub(in crate::explain) fn refit(
                 }
                 fit
             });
-        rough.extend(fits.min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared)));
-    }
+        fits.min_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared))
+    };
+    let mut rough: Vec<Fit> = screened.par_iter().take(ROUGHLY).filter_map(roughly).collect();
     rough.sort_by(|a, b| a.chi_squared.total_cmp(&b.chi_squared));
-    let chosen = choose(rough, base, max);
-    let mut candidates: Vec<Candidate> = Vec::with_capacity(chosen.len());
-    for (done, rough) in chosen.iter().enumerate() {
-        progress(0.5 + 0.5 * done as f64 / chosen.len() as f64);
+    let to_the_end = |rough: &Fit| {
         let mut fit = problem.fit(&rough.hypothesis, rough.at.clone(), Some(rough));
         if base.chi_squared - fit.chi_squared > MIN_TO_LEAP {
             fit = restart_locally(problem, fit);
         }
-        candidates.push(Candidate::of(problem, base, fit));
-    }
+        Candidate::of(problem, base, fit)
+    };
+    let chosen = choose(rough, base, max);
+    let mut candidates: Vec<Candidate> = chosen.par_iter().map(to_the_end).collect();
     candidates.sort_by(|a, b| b.improvement.total_cmp(&a.improvement));
     candidates
 }
@@ -181,7 +178,7 @@ pub(in crate::explain) fn pair_up(
     let effects_from = at.len() - score_test::effect_quantities(&first.fit.hypothesis);
     at[effects_from..].copy_from_slice(&first.fit.at[effects_from..]);
     let about = problem.with_derivatives(&first.fit.hypothesis, at);
-    let refitted = refit(problem, &base, &about, &promising, PAIRED, &mut |_| ());
+    let refitted = refit(problem, &base, &about, &promising, PAIRED);
     let mut pairs: Vec<Candidate> = refitted
         .into_iter()
         .map(|candidate| Candidate {

@@ -22,6 +22,8 @@ const POINTS_OF_CELL: usize = 5;
 const POINTS_OF_PHASE: usize = 16;
 const SPACING_M: f64 = 3.5e-3;
 const SPACING_CYCLES: f64 = 0.5;
+/// Most intervals of a time for a single cell: what it loses it loses over many cycles of a long run.
+const INTERVALS_OF_CELL: f64 = 24.0;
 /// Shortest periods, in points of a grid.
 const OF_PERIOD: f64 = 2.2;
 /// Scales of a force, as a fraction of the friction of a tip, of a factor on friction, and of a displacement, as a fraction of the stroke.
@@ -130,10 +132,17 @@ pub(super) fn laws(worm: &RecordedWorm<'_>, recalibrated: &Fit) -> Vec<Offer> {
         evenly_of(&visited.load_n, POINTS).map(|grid| offer(displacement, Axis::Load, None, grid, &visited.load_n)),
     );
     let time_grid = with_spacing(0.0, cycles, SPACING_CYCLES);
+    let grid_of_cell = with_spacing(0.0, cycles, SPACING_CYCLES.max(cycles / INTERVALS_OF_CELL));
     for cell in 0..worm.channels() {
         offers.push(offer(displacement, Axis::Phase, Some(cell), phases.clone(), &phases));
-        offers.push(offer(displacement, Axis::Time, Some(cell), time_grid.clone(), &times));
-        offers.push(offer(friction, Axis::Time, Some(cell), time_grid.clone(), &times));
+        offers.push(offer(
+            displacement,
+            Axis::Time,
+            Some(cell),
+            grid_of_cell.clone(),
+            &times,
+        ));
+        offers.push(offer(friction, Axis::Time, Some(cell), grid_of_cell.clone(), &times));
     }
     for acts_on in [force, friction] {
         let place_grid = with_spacing(place_m.0, place_m.1, SPACING_M);

@@ -8,6 +8,7 @@ use crate::explain::search::misstated::Misstated;
 use crate::explain::search::misstatement::{Misstatement, Sort};
 use crate::explain::search::parameter::Free;
 use crate::explain::search::plant::Plant;
+use rayon::prelude::*;
 
 /// A free slope: standard deviation and step of derivatives, degrees.
 const FREE_DEG: (f64, f64) = (30.0, 0.1);
@@ -154,7 +155,8 @@ fn nearest(worm: &RecordedWorm<'_>, hypothesis: &Hypothesis, run: usize, place: 
         _ => FRICTION_APART,
     };
     let trials = ((quantity.max - quantity.min) / apart) as usize;
-    (0..=trials)
+    let all: Vec<(f64, Vec<f64>)> = (0..=trials)
+        .into_par_iter()
         .map(|trial| {
             let mut values = neutral.clone();
             values[place] = quantity.min + apart * trial as f64;
@@ -165,8 +167,9 @@ fn nearest(worm: &RecordedWorm<'_>, hypothesis: &Hypothesis, run: usize, place: 
             )
         })
         .filter(|(squares, _)| squares.is_finite())
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .map_or(neutral, |(_, values)| values)
+        .collect();
+    let best = all.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or(neutral, |(_, values)| values)
 }
 
 /// What was meant, in words, and what to do about it.

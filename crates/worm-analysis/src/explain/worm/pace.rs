@@ -56,7 +56,11 @@ impl Pace {
 /// Time of a phase, s, by linear interpolation; before and after all samples it is extrapolated at a mean pace.
 pub(in crate::explain) fn time_at_s(time_s: &[f64], phase: &[f64], at: f64, cycle_s: f64) -> f64 {
     let last = phase.len() - 1;
-    let after = phase.partition_point(|&here| here < at);
+    // Most recordings are even, so that is tried first.
+    let evenly = ((at - phase[0]) / (phase[last] - phase[0]) * last as f64) as usize;
+    let mut near = evenly.saturating_sub(1)..last.min(evenly.saturating_add(2));
+    let before = near.find(|&before| phase[before] < at && at <= phase[before + 1]);
+    let after = before.map_or_else(|| phase.partition_point(|&here| here < at), |before| before + 1);
     if after == 0 || after > last {
         let end = after.min(last);
         return time_s[end] + (at - phase[end]) * cycle_s;

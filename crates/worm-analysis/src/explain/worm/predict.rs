@@ -32,7 +32,7 @@ impl Scene<'_> {
         (
             recalibrated
                 .physics
-                .with(&hypothesis.settings_at(run, f64::INFINITY, at)),
+                .with(&hypothesis.settings_at(run, f64::INFINITY, 0.0, at)),
             recalibrated.damping_ratio,
         )
     }
@@ -65,7 +65,7 @@ impl Scene<'_> {
 
     /// Whether the crawl of a run is simulated for some cycles and then repeated.
     pub fn repeats(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> bool {
-        let is_steady = !hypothesis.throughout && hypothesis.changes_at(run).is_empty();
+        let is_steady = !hypothesis.throughout && hypothesis.changes_at(run, at).is_empty();
         is_steady && !self.observed[run].pauses && self.physics(run, hypothesis, at).0.is_periodic()
     }
 
@@ -90,24 +90,21 @@ impl Scene<'_> {
     pub fn predict(&self, run: usize, hypothesis: &Hypothesis, at: &[f64]) -> Option<Predicted> {
         let observed = &self.observed[run];
         let recalibrated = self.recalibrated(run, hypothesis, at);
-        let from = |cycle: f64| {
-            recalibrated
-                .physics
-                .clone()
-                .with(&hypothesis.settings_at(run, cycle, at))
+        let from = |cycle: f64, counted_from: f64| {
+            let settings = hypothesis.settings_at(run, cycle, counted_from, at);
+            recalibrated.physics.clone().with(&settings)
         };
-        let at_start = from(f64::NEG_INFINITY);
+        let at_start = from(f64::NEG_INFINITY, 0.0);
         let damping_ratio = recalibrated.damping_ratio;
-        let clock = Clock::new(observed, at_start.view.latency_s, recalibrated.clock_drift);
-        let changes = hypothesis.changes_at(run);
+        let clock = clock(observed, &at_start, recalibrated.clock_drift);
+        let changes = hypothesis.changes_at(run, at);
         let mut predicted = if changes.is_empty() {
             let repeats = self.repeats(run, hypothesis, at);
             predict_with(observed, clock, &at_start, damping_ratio, repeats)
         } else {
-            let changes = changes.into_iter().map(|cycle| (cycle, from(cycle)));
-            predict_changes(observed, clock, &at_start, changes, damping_ratio)
+            predict_changes(observed, clock, &at_start, &changes, from, damping_ratio)
         }?;
-        let at_end = from(f64::INFINITY);
+        let at_end = from(f64::INFINITY, 0.0);
         predicted.gears = GearErrors::of(hypothesis, at, (&at_end.worm, damping_ratio));
         Some(predicted)
     }
@@ -121,39 +118,46 @@ pub(in crate::explain) fn predict(
     damping: f64,
     repeats: bool,
 ) -> Option<Predicted> {
-    let clock = Clock::new(observed, physics.view.latency_s, 0.0);
-    predict_with(observed, clock, physics, damping, repeats)
+    predict_with(observed, clock(observed, physics, 0.0), physics, damping, repeats)
+}
+
+/// When the worm did what each sample shows, by some physics.
+fn clock<'a>(observed: &'a Observed<'_>, physics: &Physics, drift: f64) -> Clock<'a> {
+    let mut clock = Clock::new(observed, physics.view.latency_s, drift);
+    if !observed.phase_recorded && physics.laws.overlap > 0.0 {
+        clock.phase_correction = Some(PhaseCorrection::new(physics.laws.overlap, observed.cells()));
+    }
+    clock
 }
 
 fn predict_with(
     observed: &Observed<'_>,
-    mut clock: Clock<'_>,
+    clock: Clock<'_>,
     physics: &Physics,
     damping: f64,
     repeats: bool,
 ) -> Option<Predicted> {
     let mechanics = Mechanics::new(physics);
-    if !observed.phase_recorded && physics.laws.overlap > 0.0 {
-        clock.phase_correction = Some(PhaseCorrection::new(physics.laws.overlap, observed.cells()));
-    }
     let mut walk = Walk::begin(observed, clock, &mechanics, damping, repeats)?;
     walk.go_to(&mechanics, f64::INFINITY, repeats)?;
     Some(walk.seen_at(physics.view.scale))
 }
 
 /// Positions at every sample of a recording, by some physics and, each from so many cycles after its start on, by others that differ in
-/// how the worm moves and not in how it is seen.
+/// how the worm moves and not in how it is seen. They are told from which cycle the crawl counts.
 fn predict_changes(
     observed: &Observed<'_>,
     clock: Clock<'_>,
     at_start: &Physics,
-    changes: impl Iterator<Item = (f64, Physics)>,
+    changes: &[f64],
+    physics_from: impl Fn(f64, f64) -> Physics,
     damping: f64,
 ) -> Option<Predicted> {
     let (mut mechanics, mut repeats) = (Mechanics::new(at_start), at_start.is_periodic());
     let mut walk = Walk::begin(observed, clock, &mechanics, damping, repeats)?;
-    for (cycle, physics) in changes {
+    for &cycle in changes {
         walk.go_to(&mechanics, observed.phase[0] + cycle, repeats)?;
+        let physics = physics_from(cycle, walk.counts_from() - observed.phase[0]);
         (mechanics, repeats) = (Mechanics::new(&physics), physics.is_periodic());
         walk.take_up(&mechanics);
     }
@@ -173,8 +177,12 @@ pub(in crate::explain) fn nominal(observed: &Observed<'_>, worm: Worm, payload_k
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::Simulation;
     use crate::explain::fixture::{Campaign, begun, hypothesis, record, scene};
+    use crate::explain::search::law::shape::LawShape;
     use crate::explain::search::parameter::Onset;
+    use std::sync::Arc;
+    use worm_physics::{ActsOn, Axis};
 
     /// A cell with less friction from the middle of the second run on: as without it before, and as with it throughout after.
     #[test]
@@ -209,5 +217,54 @@ mod tests {
             (begun_m - throughout_m).abs() < 0.05 * change_m.abs(),
             "{begun_m} and {throughout_m} m a cycle"
         );
+    }
+
+    /// A law over time that acts for a while, early or late, simulated in that while alone and to the end: the same positions, but for where
+    /// the increments end.
+    #[test]
+    fn a_law_for_a_while_is_simulated_for_a_while() {
+        let campaign = Campaign {
+            simulation: Simulation {
+                cycles: 14.0,
+                ..Campaign::default().simulation
+            },
+            ..Campaign::default()
+        };
+        let recordings = record(&campaign, None, 1);
+        let scene = scene(&recordings, &campaign);
+        let cycles: Vec<f64> = (0..=14).map(f64::from).collect();
+        for (acts_on, beyond) in [(ActsOn::FrictionFactor, -0.4), (ActsOn::DriveDisplacement, 2e-4)] {
+            for place in [1, 10] {
+                let predicted_m = |elsewhere: f64| {
+                    let shape = LawShape::of_points(acts_on, vec![(Axis::Time, cycles.clone())], Some(1));
+                    let mut values = vec![elsewhere; cycles.len()];
+                    values[place] = beyond;
+                    let law = Some(Arc::new(shape.about(&values)));
+                    let hypothesis = Hypothesis {
+                        law,
+                        ..Hypothesis::default()
+                    };
+                    let predicted = scene.predict(1, &hypothesis, &[]).expect("it holds").position_m;
+                    (hypothesis.changes_at(1, &[]), predicted)
+                };
+                let (changes, for_a_while) = predicted_m(0.0);
+                assert_eq!(changes, [place as f64 - 1.0, place as f64 + 1.0]);
+                let (changes, throughout) = predicted_m(1e-12);
+                assert_eq!(changes, Vec::<f64>::new());
+                let without = scene
+                    .predict(1, &Hypothesis::default(), &[])
+                    .expect("it holds")
+                    .position_m;
+                let largest = |one: &[f64], other: &[f64]| {
+                    let apart = one.iter().zip(other).map(|(a, b)| (a - b).abs());
+                    apart.fold(0.0, f64::max)
+                };
+                let (apart_m, change_m) = (largest(&for_a_while, &throughout), largest(&for_a_while, &without));
+                assert!(
+                    change_m > 1e-4 && apart_m < 0.03 * change_m,
+                    "{acts_on:?} about cycle {place}: {apart_m} m apart, a change of {change_m} m"
+                );
+            }
+        }
     }
 }

@@ -103,6 +103,11 @@ impl<'a> Walk<'a> {
         (phase * per_cycle).ceil() / per_cycle
     }
 
+    /// Phase from which the crawl counts its cycles: that of its beginning, or the last at which it went on from what repeats.
+    pub fn counts_from(&self) -> f64 {
+        self.crawl.first_phase()
+    }
+
     /// Changes the mechanics: nothing moves.
     pub fn take_up(&mut self, mechanics: &Mechanics) {
         self.crawl.take_up(mechanics);

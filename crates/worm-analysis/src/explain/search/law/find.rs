@@ -12,6 +12,7 @@ use super::formula::{Formula, nearest};
 use super::kernel::{Prior, priors};
 use super::offer::Offer;
 use super::shape::LawShape;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Laws that are fitted to the end: those of most evidence.
@@ -64,16 +65,21 @@ impl FittedLaws {
     }
 }
 
-/// Of the forms of one law the first, which is the best.
-fn best_of_each(sorted: Vec<(Weighed, Fit)>) -> Vec<(Weighed, Fit)> {
-    let mut best: Vec<(Weighed, Fit)> = Vec::new();
-    for one in sorted {
-        let shape = &one.0.offer.shape;
-        if !best.iter().any(|(other, _)| other.offer.shape.is_over_the_same(shape)) {
-            best.push(one);
+/// The most probable of some laws and another, each in its best form, most probable first.
+fn with_another(mut weighed: Vec<(Weighed, Fit)>, another: (Weighed, Fit)) -> Vec<(Weighed, Fit)> {
+    weighed.push(another);
+    weighed.sort_by(|(a, _), (b, _)| b.ln_bayes.total_cmp(&a.ln_bayes));
+    let best = weighed.first().map_or(0.0, |(best, _)| best.ln_bayes);
+    let mut kept: Vec<(Weighed, Fit)> = Vec::new();
+    for one in weighed {
+        let (shape, ln_bayes) = (&one.0.offer.shape, one.0.ln_bayes);
+        let is_near = ln_bayes > WORTH && ln_bayes > best - NEAR.max(0.5 * best);
+        let is_known = kept.iter().any(|(other, _)| other.offer.shape.is_over_the_same(shape));
+        if is_near && !is_known && kept.len() < FITTED {
+            kept.push(one);
         }
     }
-    best
+    kept
 }
 
 impl<P: Plant> LawSearch<'_, '_, P> {
@@ -85,30 +91,27 @@ impl<P: Plant> LawSearch<'_, '_, P> {
         for (done, offer) in offers.into_iter().enumerate() {
             report(0.6 * done as f64 / offered as f64);
             let (about, beyond) = self.start(&offer);
-            weighed.extend(self.weigh(&about, &offer, &beyond).map(|weighed| (weighed, about)));
+            if let Some(one) = self.weigh(&about, &offer, &beyond) {
+                weighed = with_another(weighed, (one, about));
+            }
         }
-        weighed.sort_by(|(a, _), (b, _)| b.ln_bayes.total_cmp(&a.ln_bayes));
-        let best = weighed.first().map_or(0.0, |(best, _)| best.ln_bayes);
-        weighed.retain(|(one, _)| one.ln_bayes > WORTH && one.ln_bayes > best - NEAR.max(0.5 * best));
-        let mut weighed = best_of_each(weighed);
-        weighed.truncate(FITTED);
-        let tried = weighed.len() as f64;
-        let mut each: Vec<(FittedLaw, Weighed)> = Vec::new();
-        for (done, (one, about)) in weighed.into_iter().enumerate() {
-            report(0.6 + 0.4 * done as f64 / tried);
-            each.extend(self.fit_to_the_end(&about, &one).map(|law| (law, one)));
+        report(0.6);
+        let fitted = weighed.into_par_iter().filter_map(|(one, about)| {
+            let law = self.fit_to_the_end(&about, &one)?;
+            Some((law, one))
+        });
+        FittedLaws {
+            each: fitted.collect(),
+            offered,
         }
-        FittedLaws { each, offered }
     }
 
     /// The law that closes the gap of a recalibrated plant; none where nothing predicts better than no law.
     pub fn best(&self, laws: FittedLaws, report: &mut dyn FnMut(f64)) -> Option<FoundLaw> {
         let mut fitted = laws.each;
         fitted.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
-        for (done, (law, of)) in fitted.iter_mut().take(ANEW).enumerate() {
-            report(0.8 * done as f64 / ANEW as f64);
-            self.fit_anew(law, of);
-        }
+        let promising = fitted.par_iter_mut().take(ANEW);
+        promising.for_each(|(law, of)| self.fit_anew(law, of));
         fitted.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
         let best = fitted.first().map(|(law, _)| law.gain).filter(|gain| *gain >= CLAIMS)?;
         let near = fitted.into_iter().filter(|(law, _)| law.gain > best - RIVAL);

@@ -11,7 +11,7 @@ const TURN: f64 = 0.05;
 const SLIDES: [f64; 7] = [0.0, 0.004, 0.012, 0.04, 0.12, 0.35, 1.0];
 const TURN_OF_SLIDE: f64 = 0.01;
 /// Most points along an axis.
-const MOST_POINTS: usize = 80;
+const MOST_POINTS: usize = 56;
 /// Most coordinates that are kept of where the data are.
 const SEEN: usize = 600;
 

@@ -1,11 +1,21 @@
 //! The form of a law of which some coefficients are open.
 
+use super::super::parameter::Onset;
 use std::fmt;
 use worm_physics::effect::Setting;
 use worm_physics::{ActsOn, Axis, MAX_CELLS, Table};
 
 /// Least factor on friction: a tip without any cannot be solved for.
 const MIN_FACTOR: f64 = 0.05;
+
+/// When a law acts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::explain) enum Acts {
+    Throughout,
+    /// Before and after, the plant moves as without it.
+    Within(Onset),
+    Never,
+}
 
 /// A law at the points of a grid: its values are a centre and a sum of columns, each with a coefficient.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,6 +85,27 @@ impl LawShape {
         value
     }
 
+    /// When the law acts with some coefficients: one over time alone, where its values are others than none.
+    pub fn acts(&self, coefficients: &[f64]) -> Acts {
+        let [(Axis::Time, grid)] = &self.axes[..] else {
+            return Acts::Throughout;
+        };
+        let value = self.value(coefficients);
+        let is_some = |value: &f64| *value != self.acts_on.neutral();
+        let (Some(first), Some(last)) = (value.iter().position(is_some), value.iter().rposition(is_some)) else {
+            return Acts::Never;
+        };
+        let onset = Onset {
+            begins: first.checked_sub(1).map(|before| grid[before]),
+            ends: grid.get(last + 1).copied(),
+            run: None,
+        };
+        match onset.begins.or(onset.ends) {
+            Some(_) if self.period.is_none() => Acts::Within(onset),
+            _ => Acts::Throughout,
+        }
+    }
+
     /// The law with some coefficients; none where that is no table.
     pub fn table(&self, coefficients: &[f64]) -> Option<Table> {
         let table = Table::new(self.acts_on, &self.axes, self.value(coefficients), self.period).ok()?;
@@ -82,6 +113,13 @@ impl LawShape {
             Some(memory_s) => table.with_memory(memory_s).ok(),
             None => Some(table),
         }
+    }
+
+    /// The same law for a crawl that counts its cycles from so many after the start of the run.
+    pub fn counted_from(mut self, cycles: f64) -> Self {
+        let over_time = self.axes.iter_mut().filter(|(axis, _)| *axis == Axis::Time);
+        over_time.for_each(|(_, grid)| grid.iter_mut().for_each(|at| *at -= cycles));
+        self
     }
 
     /// Whether it is another form of one law: over the same axes, but remembered for another time.
