@@ -9,6 +9,9 @@
 //!
 //! `WORMD_PRINT_TABLE=1` prints the table. docs/faults.md holds the same rows.
 
+use super::fault_cases::Cause::{Cable, Pause, Worm};
+use super::fault_cases::Severity::{Mild, Severe};
+use super::fault_cases::{CASES, Case};
 use super::harness::{config, session, wired};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -17,7 +20,7 @@ use worm_estimator::message::{AlarmKind, CommandKind, CommandOutcome, Fault, Mod
 use wormd::link::Faults;
 use wormd::link::virtual_worm::{Fault as WormFault, Options};
 use wormd::soak::invariants::{Invariants, Truth};
-use wormd::soak::{Machine, Paused, Session, Wired};
+use wormd::soak::{Machine, Session, Wired};
 
 const CYCLE_S: f64 = 1.25;
 const RATE_HZ: f64 = 1000.0;
@@ -26,194 +29,7 @@ const PHASES: [f64; 3] = [0.02, 0.38, 0.74];
 /// Cycles before: the alarms have calibrated on three.
 const CALIBRATED: f64 = 4.3;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Severity {
-    Mild,
-    Severe,
-}
-use Severity::{Mild, Severe};
-
-/// What is done to the worm.
-#[derive(Debug, Clone)]
-enum Cause {
-    /// A fault of the virtual worm.
-    Worm(&'static str),
-    /// The bus's fault injector, byte by byte.
-    Cable(&'static str, Faults),
-    /// A part of the computer does not run for so many milliseconds.
-    Pause(&'static str, Paused, u64),
-}
-
-struct Case {
-    toml: &'static str,
-    cause: fn() -> Cause,
-    severity: Severity,
-    lasts_s: f64,
-}
-
-const fn case(severity: Severity, lasts_s: f64, toml: &'static str, cause: fn() -> Cause) -> Case {
-    Case {
-        toml,
-        cause,
-        severity,
-        lasts_s,
-    }
-}
-
-const LEVEL: &str = "";
-const STEEP: &str = "canal.slope_deg = 30\n";
-const BATTERY: &str = "[battery]\ncapacity_j = 400.0\nfull_v = 5.6\nempty_v = 4.0\ninternal_resistance_ohm = 0.2\n\
-                       hotel_power_w = 0.5\nreserve_share = 0.1\n";
-
-const SWITCH: &str = "[emergency_stop]\nsource = \"tracker\"\n";
-
-use Cause::{Cable, Pause, Worm};
-
-const CASES: &[Case] = &[
-    case(Severe, 1.5, LEVEL, || Worm("stall")),
-    case(Mild, 4.0, LEVEL, || Worm("friction-inside:scale=2")),
-    case(Severe, 15.0, LEVEL, || Worm("friction-inside:scale=5")),
-    case(Mild, 4.0, LEVEL, || Worm("jam:cell=2,share=0.9")),
-    case(Severe, 4.0, LEVEL, || Worm("jam:cell=2,share=0")),
-    case(Mild, 4.0, STEEP, || Worm("slip:friction=0.9")),
-    case(Severe, 6.0, STEEP, || Worm("slip:friction=0.3")),
-    case(Mild, 4.0, LEVEL, || Worm("slide:speed=0.0001")),
-    case(Severe, 4.0, LEVEL, || Worm("slide:speed=0.02")),
-    case(Mild, 4.0, LEVEL, || Worm("slope:deg=2")),
-    case(Severe, 6.0, STEEP, || Worm("slope:deg=75")),
-    case(Mild, 4.0, LEVEL, || Worm("drag:force=0.02")),
-    case(Severe, 25.0, LEVEL, || Worm("drag:force=1")),
-    case(Mild, 4.0, BATTERY, || Worm("battery:charge=0.9")),
-    // A charge that is lost at once shows only in the voltage, after minutes.
-    case(Mild, 10.0, BATTERY, || Worm("battery:charge=0.05")),
-    case(Mild, 4.0, LEVEL, || Worm("sag:volts=0.3")),
-    case(Severe, 3.0, LEVEL, || Worm("sag:volts=1.5")),
-    case(Mild, 0.03, LEVEL, || Worm("silence:device=servo")),
-    case(Severe, 2.0, LEVEL, || Worm("silence:device=servo")),
-    case(Mild, 0.1, LEVEL, || Worm("silence:device=tracker")),
-    case(Severe, 2.0, LEVEL, || Worm("silence:device=tracker")),
-    case(Mild, 4.0, LEVEL, || Worm("drop:share=0.02")),
-    case(Severe, 4.0, LEVEL, || Worm("drop:share=0.5")),
-    case(Mild, 4.0, LEVEL, || Worm("corrupt:share=0.02")),
-    case(Severe, 4.0, LEVEL, || Worm("corrupt:share=0.5")),
-    case(Mild, 4.0, LEVEL, || Worm("delay:ms=2")),
-    case(Severe, 2.0, LEVEL, || Worm("delay:ms=300")),
-    case(Mild, 2.0, LEVEL, || Worm("reboot:off=0.01")),
-    case(Severe, 2.0, LEVEL, || Worm("reboot:off=0.5")),
-    case(Mild, 4.0, LEVEL, || Worm("overheat:ambient=45")),
-    case(Severe, 3.0, LEVEL, || Worm("overheat:ambient=68")),
-    case(Severe, 2.0, LEVEL, || Worm("hardware-error:bits=32")),
-    case(Severe, 3.0, LEVEL, || Worm("blind:cell=3")),
-    case(Mild, 4.0, LEVEL, || Worm("dropout:share=0.1")),
-    case(Severe, 4.0, LEVEL, || Worm("dropout:share=0.7")),
-    case(Mild, 4.0, LEVEL, || Worm("noise:m=0.0003")),
-    // The model number is read only when torque is switched on.
-    case(Mild, 2.0, LEVEL, || Worm("wrong-model:number=1190")),
-    // So is the firmware; the motor of such a servo goes on when the link breaks.
-    case(Mild, 2.0, LEVEL, || Worm("watchdog-defect:firmware=51")),
-    case(Severe, 1.0, SWITCH, || Worm("emergency-stop:bits=1")),
-    case(Mild, 3.0, LEVEL, || {
-        Cable(
-            "bytes lost: 1 in 1000",
-            Faults {
-                drop: 1e-3,
-                ..Faults::NONE
-            },
-        )
-    }),
-    case(Severe, 3.0, LEVEL, || {
-        Cable(
-            "bytes lost: 1 in 50",
-            Faults {
-                drop: 0.02,
-                ..Faults::NONE
-            },
-        )
-    }),
-    case(Mild, 3.0, LEVEL, || {
-        Cable(
-            "bits flipped: 1 byte in 1000",
-            Faults {
-                flip: 1e-3,
-                ..Faults::NONE
-            },
-        )
-    }),
-    case(Severe, 3.0, LEVEL, || {
-        Cable(
-            "bits flipped: 1 byte in 50",
-            Faults {
-                flip: 0.02,
-                ..Faults::NONE
-            },
-        )
-    }),
-    case(Severe, 3.0, LEVEL, || {
-        Cable(
-            "bytes doubled: 1 in 50",
-            Faults {
-                duplicate: 0.02,
-                ..Faults::NONE
-            },
-        )
-    }),
-    case(Severe, 3.0, LEVEL, || {
-        Cable(
-            "answers cut off: 1 in 2",
-            Faults {
-                truncate: 0.5,
-                ..Faults::NONE
-            },
-        )
-    }),
-    case(Severe, 3.0, LEVEL, || {
-        Cable(
-            "sent bytes lost: 1 in 50",
-            Faults {
-                drop_sent: 0.02,
-                ..Faults::NONE
-            },
-        )
-    }),
-    case(Severe, 2.0, LEVEL, || {
-        Cable(
-            "nothing received",
-            Faults {
-                silence: 0..u64::MAX,
-                ..Faults::NONE
-            },
-        )
-    }),
-    case(Severe, 1.5, LEVEL, || {
-        Pause("estimator paused 1 s", Paused::Estimator, 1000)
-    }),
-    case(Mild, 1.0, LEVEL, || {
-        Pause("controller paused 50 ms", Paused::Controller, 50)
-    }),
-    case(Severe, 1.0, LEVEL, || {
-        Pause("controller paused 300 ms", Paused::Controller, 300)
-    }),
-    case(Mild, 1.0, LEVEL, || {
-        Pause("computer paused 300 ms", Paused::Computer, 300)
-    }),
-    case(Mild, 1.0, LEVEL, || {
-        Pause("virtual worm paused 50 ms", Paused::Worm, 50)
-    }),
-    case(Severe, 1.5, LEVEL, || {
-        Pause("virtual worm paused 500 ms", Paused::Worm, 500)
-    }),
-];
-
 const MODES: [Mode; 5] = [Mode::Armed, Mode::Crawling, Mode::Holding, Mode::Stopping, Mode::Fault];
-
-impl Cause {
-    fn name(&self) -> &'static str {
-        match self {
-            Worm(spec) => spec,
-            Cable(name, _) | Pause(name, ..) => name,
-        }
-    }
-}
 
 /// What became of one cell.
 #[derive(Debug, Clone, PartialEq)]

@@ -19,6 +19,7 @@
 
 mod accuracy;
 mod bare;
+mod fault_cases;
 mod fault_table;
 mod faults;
 mod harness;
