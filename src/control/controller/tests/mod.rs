@@ -12,6 +12,7 @@ mod recovery;
 
 use super::*;
 use crate::control::EstimateSeen;
+use crate::control::standing_alarms::bit;
 use crate::link::{ServoReading, TrackerReading};
 use worm_estimator::message::{Alarm, Command, CommandKind, CommandOutcome, Reply};
 
