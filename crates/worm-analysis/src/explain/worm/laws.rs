@@ -22,8 +22,8 @@ const POINTS_OF_CELL: usize = 5;
 const POINTS_OF_PHASE: usize = 16;
 const SPACING_M: f64 = 3.5e-3;
 const SPACING_CYCLES: f64 = 0.5;
-/// Most intervals of a time for a single cell: what it loses it loses over many cycles of a long run.
-const INTERVALS_OF_CELL: f64 = 24.0;
+/// Most intervals of a time for single cells, all together.
+const INTERVALS_OF_CELLS: f64 = 220.0;
 /// Shortest periods, in points of a grid.
 const OF_PERIOD: f64 = 2.2;
 /// Scales of a force, as a fraction of the friction of a tip, of a factor on friction, and of a displacement, as a fraction of the stroke.
@@ -132,7 +132,8 @@ pub(super) fn laws(worm: &RecordedWorm<'_>, recalibrated: &Fit) -> Vec<Offer> {
         evenly_of(&visited.load_n, POINTS).map(|grid| offer(displacement, Axis::Load, None, grid, &visited.load_n)),
     );
     let time_grid = with_spacing(0.0, cycles, SPACING_CYCLES);
-    let grid_of_cell = with_spacing(0.0, cycles, SPACING_CYCLES.max(cycles / INTERVALS_OF_CELL));
+    let of_cell = SPACING_CYCLES.max(cycles * worm.channels() as f64 / INTERVALS_OF_CELLS);
+    let grid_of_cell = with_spacing(0.0, cycles, of_cell);
     for cell in 0..worm.channels() {
         offers.push(offer(displacement, Axis::Phase, Some(cell), phases.clone(), &phases));
         offers.push(offer(
