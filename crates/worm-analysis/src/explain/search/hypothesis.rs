@@ -88,6 +88,11 @@ impl Hypothesis {
         law.setting(&self.law_coefficients(at))
     }
 
+    /// Whether there is a law that acts for a while alone.
+    pub fn has_law_for_a_while(&self, at: &[f64]) -> bool {
+        matches!(self.law_acts(at), Acts::Within(_))
+    }
+
     /// When the law acts.
     fn law_acts(&self, at: &[f64]) -> Acts {
         let law = self.law.as_ref();

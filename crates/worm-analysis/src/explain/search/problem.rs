@@ -176,6 +176,15 @@ impl<'p, P: Plant> FitProblem<'p, P> {
             let mut probe = at.to_vec();
             probe[quantity] += step;
             let mut column = self.plant.predict(run, hypothesis, &probe).residuals;
+            if hypothesis.has_law_for_a_while(&probe) {
+                // It is simulated with other increments for that while, which the same to the other side has as well.
+                probe[quantity] = at[quantity] - step;
+                let other = self.plant.predict(run, hypothesis, &probe).residuals;
+                for (value, other) in column.iter_mut().zip(other) {
+                    *value = (*value - other) / (2.0 * step);
+                }
+                return column;
+            }
             for (value, here) in column.iter_mut().zip(here) {
                 *value = (*value - here) / step;
             }
