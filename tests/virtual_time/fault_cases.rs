@@ -1,5 +1,6 @@
 //! What is done to a worm in the table of faults: each cause with its severity, how long it lasts, and the configuration that it needs.
 
+use super::harness::{BATTERY, LEVEL, STEEP, SWITCH};
 use wormd::link::Faults;
 use wormd::soak::Paused;
 
@@ -36,13 +37,6 @@ const fn case(severity: Severity, lasts_s: f64, toml: &'static str, cause: fn() 
         lasts_s,
     }
 }
-
-const LEVEL: &str = "";
-const STEEP: &str = "canal.slope_deg = 30\n";
-const BATTERY: &str = "[battery]\ncapacity_j = 400.0\nfull_v = 5.6\nempty_v = 4.0\ninternal_resistance_ohm = 0.2\n\
-                       hotel_power_w = 0.5\nreserve_share = 0.1\n";
-
-const SWITCH: &str = "[emergency_stop]\nsource = \"tracker\"\n";
 
 use Cause::{Cable, Pause, Worm};
 

@@ -1,6 +1,6 @@
 //! What each fault of the virtual worm brings about: which alarms, which fault of the controller, by when, and nothing else.
 
-use super::harness::{self, Obeying, config, crawling, wired};
+use super::harness::{self, BATTERY, LEVEL, Obeying, STEEP, config, crawling, wired};
 use std::fmt::Write;
 use worm_estimator::message::{Alarm, AlarmKind, CommandKind, Fault, Mode};
 use wormd::control::{Service, ServiceOutcome};
@@ -41,11 +41,7 @@ const fn case(
     }
 }
 
-const LEVEL: &str = "";
-const STEEP: &str = "canal.slope_deg = 30\n";
 const STEEPEST: &str = "canal.slope_deg = 45\n";
-const BATTERY: &str = "[battery]\ncapacity_j = 400.0\nfull_v = 5.6\nempty_v = 4.0\ninternal_resistance_ohm = 0.2\n\
-                       hotel_power_w = 0.5\nreserve_share = 0.1\n";
 
 use AlarmKind::{
     BatteryLow, DeviceFault, EnergyOverBudget, JammedCell, LinkFault, ModelMismatch, MoreLoad, MotorStall, NoProgress,

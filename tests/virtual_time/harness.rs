@@ -5,6 +5,13 @@ use worm_estimator::message::{CommandKind, CommandOutcome, Mode};
 use wormd::link::virtual_worm::Options;
 use wormd::soak::{Machine, Session, Wired};
 
+// What the configurations of several tests differ in from the default.
+pub const LEVEL: &str = "";
+pub const STEEP: &str = "canal.slope_deg = 30\n";
+pub const BATTERY: &str = "[battery]\ncapacity_j = 400.0\nfull_v = 5.6\nempty_v = 4.0\ninternal_resistance_ohm = 0.2\n\
+                           hotel_power_w = 0.5\nreserve_share = 0.1\n";
+pub const SWITCH: &str = "[emergency_stop]\nsource = \"tracker\"\n";
+
 /// A configuration from what differs.
 pub fn config(toml: &str) -> Config {
     Config::from_toml(toml, "test".as_ref()).expect("a valid test configuration")

@@ -1,6 +1,6 @@
 //! Every fault that can be injected, and what `wormd why` says of it: the first reason must be the right one.
 
-use super::harness::{Obeying, config, session, wired};
+use super::harness::{LEVEL, Obeying, STEEP, SWITCH, config, session, wired};
 use worm_estimator::message::{Command, CommandKind, CommandRecord, Mode, Reply, ShortText, State};
 use worm_log::Log;
 use wormd::link::virtual_worm::Options;
@@ -11,9 +11,6 @@ const CYCLE: &str = "gait.cycle_s = 1.25\n";
 const RATE_HZ: f64 = 1000.0;
 /// The alarms have calibrated on three cycles.
 const CALIBRATED_S: f64 = 4.4 * 1.25;
-const STEEP: &str = "canal.slope_deg = 30\n";
-const SWITCH: &str = "[emergency_stop]\nsource = \"tracker\"\n";
-const LEVEL: &str = "";
 
 /// What is done to a crawling worm.
 enum Done {

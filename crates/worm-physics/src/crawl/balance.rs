@@ -8,6 +8,8 @@ use crate::worm::SlidesDown;
 
 /// Tolerance of the balance, as a fraction of what the tips can hold.
 const BALANCE_FRACTION: f64 = 1e-7;
+/// How far the body may be from where it balances, m: where nearly every tip slides, little force is much way.
+const BALANCE_M: f64 = 1e-10;
 /// Most iterations of an increment: bisection alone would have converged by then.
 const MAX_ITERATIONS: usize = 120;
 /// Displacement of the body in one increment beyond which it counts as sliding down, m.
@@ -22,6 +24,13 @@ const NARROW_M: f64 = 1e-16;
 pub(super) struct Balance {
     excess_n: f64,
     slope_n_per_m: f64,
+}
+
+impl Balance {
+    fn is_within(&self, tolerance_n: f64) -> bool {
+        let excess_n = self.excess_n.abs();
+        excess_n <= tolerance_n && (excess_n <= BALANCE_M * self.slope_n_per_m || self.slope_n_per_m <= 0.0)
+    }
 }
 
 impl Crawl {
@@ -41,7 +50,7 @@ impl Crawl {
         let mut reach_m = 1e-4;
         let mut balance = self.try_out(mechanics, increment, at_m);
         for _ in 0..MAX_ITERATIONS {
-            if balance.excess_n.abs() <= tolerance_n || high_m - low_m < NARROW_M {
+            if balance.is_within(tolerance_n) || high_m - low_m < NARROW_M {
                 break;
             }
             if balance.excess_n > 0.0 {
