@@ -97,8 +97,7 @@ fn by_torque_balance(
     acts_on: ActsOn,
     axes: &[(Axis, Vec<f64>)],
 ) -> Option<Vec<f64>> {
-    let second = axes.get(1).map_or(1, |(_, grid)| grid.len());
-    let points = axes[0].1.len() * second;
+    let points = axes.iter().map(|(_, grid)| grid.len()).product();
     let mut normal = DMatrix::identity(points, points) * FEW;
     let mut along = DVector::zeros(points);
     for moment in all.iter().filter(|moment| moment.velocity_rad_s.abs() > MOVES_RAD_S) {
@@ -108,19 +107,7 @@ fn by_torque_balance(
             ActsOn::MotorTorque => -beyond_n_m * moment.velocity_rad_s.signum(),
             _ => beyond_n_m,
         };
-        let along_axis = |axis: usize| match axes.get(axis) {
-            Some((axis, grid)) => parts(grid, on(*axis, moment)),
-            None => [(0, 1.0), (0, 0.0)],
-        };
-        let (rows, columns) = (along_axis(0), along_axis(1));
-        let hats: Vec<(usize, f64)> = rows
-            .iter()
-            .flat_map(|(row, of_row)| {
-                columns
-                    .iter()
-                    .map(move |(column, part)| (row * second + column, of_row * part))
-            })
-            .collect();
+        let hats = parts(axes, |axis| on(axes[axis].0, moment));
         for &(one, by) in &hats {
             along[one] += by * value;
             for &(other, of_other) in &hats {

@@ -8,6 +8,9 @@ use super::super::problem::FitProblem;
 use super::evidence::Evidence;
 use super::prior::is_possible;
 
+/// Standard errors by which a severity is off its limit: what may as well be at its limit fits something else.
+const OFF_LIMIT: f64 = 2.0;
+
 /// A fitted effect, or a pair.
 #[derive(Debug, Clone)]
 pub(in crate::explain) struct Candidate {
@@ -72,7 +75,7 @@ impl Candidate {
             } else {
                 severity.min
             };
-            let is_inside = (value - limit).abs() > sigma_of(place);
+            let is_inside = (value - limit).abs() > OFF_LIMIT * sigma_of(place);
             (value - severity.neutral).abs() >= severity.notable && is_inside && is_possible(setting.effect(), value)
         });
         let free = self.fit.hypothesis.free.iter().enumerate();

@@ -15,10 +15,11 @@ use super::shape::LawShape;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Laws that are fitted to the end: those of most evidence.
-const FITTED: usize = 5;
+/// Laws that are fitted to the end: those of most evidence. That is to first order, and a strong law is not linear: the right one of worms
+/// that lacked a strong effect was up to the sixth.
+const FITTED: usize = 6;
 /// Those of them that are fitted anew about what was found, the best; and how often.
-const ANEW: usize = 2;
+const ANEW: usize = 3;
 const PASSES: usize = 2;
 /// Logarithm of the Bayes factor from which a law is fitted at all, and below the best of all up to which.
 const WORTH: f64 = 2.0;
@@ -201,12 +202,14 @@ impl<P: Plant> LawSearch<'_, '_, P> {
         Some(law)
     }
 
-    /// Fits a law anew about what was found, as long as it predicts better then: far from no law other directions are determined.
+    /// Fits a law anew about what was found, as long as it predicts better then: far from no law other directions are determined, and
+    /// the plant goes where it did not without the law.
     fn fit_anew(&self, law: &mut FittedLaw, weighed: &mut Weighed) {
         for _ in 0..PASSES {
-            let offer = &weighed.offer;
-            let about = law.besides(self.problem, offer.shape.clone().about(&law.beyond));
-            let Some(anew) = self.weigh(&about, offer, &law.beyond) else {
+            let offer = self.where_it_goes(law, &weighed.offer);
+            let beyond = weighed.offer.shape.onto(&law.beyond, &offer.shape);
+            let about = law.besides(self.problem, offer.shape.clone().about(&beyond));
+            let Some(anew) = self.weigh(&about, &offer, &beyond) else {
                 return;
             };
             let Some(better) = self
@@ -217,5 +220,13 @@ impl<P: Plant> LawSearch<'_, '_, P> {
             };
             (*law, *weighed) = (better, anew);
         }
+    }
+
+    /// An offer over where the plant goes with a law; the same where it does not move with it.
+    fn where_it_goes(&self, law: &FittedLaw, offer: &Offer) -> Offer {
+        let offers = self.problem.plant.laws(&law.fit).into_iter();
+        let mut the_same = offers
+            .filter(|other| offer.shape.is_over_the_same(&other.shape) && offer.shape.memory_s == other.shape.memory_s);
+        the_same.next().unwrap_or_else(|| offer.clone())
     }
 }

@@ -69,8 +69,27 @@ pub(in crate::explain) fn scaled(axis: Axis, grid: &[f64]) -> Vec<f64> {
     }
 }
 
-/// The points of a grid about a place, with the part that each has in a value there that is linear between points and flat beyond them.
-pub(in crate::explain) fn parts(grid: &[f64], at: f64) -> [(usize, f64); 2] {
+/// The points of a grid over one axis or two about a place, with the part that each has in a value there that is linear between points and
+/// flat beyond them; `at` is where the place is along an axis.
+pub(in crate::explain) fn parts(axes: &[(Axis, Vec<f64>)], at: impl Fn(usize) -> f64) -> Vec<(usize, f64)> {
+    let along = |axis: usize| axes.get(axis).map(|(_, grid)| parts_along(grid, at(axis)));
+    let Some(rows) = along(0) else {
+        return Vec::new();
+    };
+    let (columns, count) = match along(1) {
+        Some(columns) => (columns.to_vec(), axes[1].1.len()),
+        None => (vec![(0, 1.0)], 1),
+    };
+    let of_row = |(row, part): (usize, f64)| {
+        columns
+            .iter()
+            .map(move |(column, by)| (row * count + column, part * by))
+    };
+    rows.into_iter().flat_map(of_row).collect()
+}
+
+/// The same along one axis.
+fn parts_along(grid: &[f64], at: f64) -> [(usize, f64); 2] {
     let above = grid.partition_point(|point| *point <= at).clamp(1, grid.len() - 1);
     let (from, to) = (grid[above - 1], grid[above]);
     let part = ((at - from) / (to - from)).clamp(0.0, 1.0);

@@ -1,6 +1,7 @@
 //! The form of a law of which some coefficients are open.
 
 use super::super::parameter::Onset;
+use super::grid::parts;
 use std::fmt;
 use worm_physics::effect::Setting;
 use worm_physics::{ActsOn, Axis, MAX_CELLS, Table};
@@ -128,6 +129,17 @@ impl LawShape {
         (self.acts_on, self.cell) == (other.acts_on, other.cell) && axes(self) == axes(other)
     }
 
+    /// Values at the points of the grid, read at those of another over the same axes: linear between points, flat beyond them.
+    pub fn onto(&self, values: &[f64], other: &Self) -> Vec<f64> {
+        let second = other.axes.get(1).map_or(1, |(_, grid)| grid.len());
+        let value = |point: usize| {
+            let along = |axis: usize| other.axes[axis].1[if axis == 0 { point / second } else { point % second }];
+            let all = parts(&self.axes, along).into_iter();
+            all.map(|(place, part)| part * values[place]).sum()
+        };
+        (0..other.centre.len()).map(value).collect()
+    }
+
     /// The law as a setting of the physics.
     pub fn setting(&self, coefficients: &[f64]) -> Option<Setting> {
         let table = self.table(coefficients)?;
@@ -145,5 +157,25 @@ impl fmt::Display for LawShape {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let axes: Vec<&str> = self.axes.iter().map(|(axis, _)| axis.name()).collect();
         write!(f, "{} over {}", self.acts_on.name(), axes.join(" and "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_read_between_points_and_flat_beyond_them() {
+        let over = |axes: &[(Axis, &[f64])]| {
+            let axes = axes.iter().map(|(axis, grid)| (*axis, grid.to_vec()));
+            LawShape::of_points(ActsOn::ContactForce, axes.collect(), None)
+        };
+        let one = over(&[(Axis::Deformation, &[-1.0, 0.0, 2.0])]);
+        let wider = over(&[(Axis::Deformation, &[-3.0, -1.0, -0.25, 1.5, 4.0])]);
+        assert_eq!(one.onto(&[4.0, 0.0, 8.0], &wider), [4.0, 4.0, 1.0, 6.0, 8.0]);
+        let two = over(&[(Axis::GearLoad, &[0.0, 1.0]), (Axis::MotorSpeed, &[0.0, 2.0, 4.0])]);
+        let between = over(&[(Axis::GearLoad, &[0.5, 1.0]), (Axis::MotorSpeed, &[1.0, 9.0])]);
+        let values = [0.0, 2.0, 4.0, 10.0, 12.0, 14.0];
+        assert_eq!(two.onto(&values, &between), [6.0, 9.0, 11.0, 14.0]);
     }
 }
