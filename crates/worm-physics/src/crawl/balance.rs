@@ -27,6 +27,7 @@ pub(super) struct Balance {
 }
 
 impl Balance {
+    /// Whether what is left over is little force, and little way. Where every tip slides there is no way that it would take.
     fn is_within(&self, tolerance_n: f64) -> bool {
         let excess_n = self.excess_n.abs();
         excess_n <= tolerance_n && (excess_n <= BALANCE_M * self.slope_n_per_m || self.slope_n_per_m <= 0.0)

@@ -139,8 +139,9 @@ pub(in crate::explain) trait Plant: Recorded {
     fn misstatements(&self, _base: &Hypothesis) -> Vec<Misstatement> {
         Vec::new()
     }
-    /// What a law that nobody listed may depend on; nothing unless the plant says so.
-    fn laws(&self, _recalibrated: &Fit) -> Vec<Offer> {
+    /// What a law that nobody listed may depend on, over where the plant goes by a fit: the recalibrated one, or one with such a law that is
+    /// to be fitted anew. Nothing unless the plant says so.
+    fn laws(&self, _fit: &Fit) -> Vec<Offer> {
         Vec::new()
     }
     /// Whether such laws are weighed as what else may be missing in any case, and not only where the answer would be an effect or wrong

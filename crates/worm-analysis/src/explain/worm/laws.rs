@@ -1,6 +1,7 @@
 //! What a law of a worm may depend on: the quantities of its cells, over the ranges that they go through.
 //!
-//! The ranges are those of a crawl of the recalibrated model in every run, and for the place those of the recordings.
+//! The ranges are those of a crawl of the recalibrated model in every run, with a law where one is fitted anew, and for the place those of
+//! the recordings.
 
 use super::recorded_worm::RecordedWorm;
 use crate::explain::search::fit::Fit;
