@@ -52,6 +52,10 @@ pub struct ExplainArgs {
     /// Relative change of the advance that an effect is expected to make, give or take a factor of 2.5; 0.01 to 0.5
     #[arg(long, value_name = "FRACTION", default_value_t = Options::default().expected_impact, value_parser = |text: &str| fraction(text, 0.01..=0.5))]
     expected_impact: f64,
+    /// How much the friction of a worm's tip usually differs from one cycle to the next, give or take a factor of two: what moves the body much
+    /// more irregularly is missing in the model; 0.001 to 0.2
+    #[arg(long, value_name = "FRACTION", default_value_t = Options::default().scatter, value_parser = |text: &str| fraction(text, 0.001..=0.2))]
+    scatter: f64,
     /// Leave an effect of the library out of the search, to see what it would say without; may be given several times
     #[arg(long, value_name = "EFFECT", value_parser = effect_name)]
     without: Vec<&'static str>,
@@ -165,6 +169,7 @@ impl ExplainArgs {
             discrepancy: self.discrepancy.unwrap_or(usual.discrepancy),
             matters: self.matters.unwrap_or(usual.matters),
             expected_impact: self.expected_impact,
+            scatter: self.scatter,
             without: self.without.clone(),
             evidence: match self.current {
                 None => Evidence::Positions,

@@ -337,6 +337,8 @@ class Explanation(Result):
     """The work of a cycle by the motor's current and by the model differ by no more than this, J; where the current counts."""
     discrepancy_m: float
     """What the model is taken to be wrong by everywhere, m."""
+    friction_scatter: float | None
+    """How much the friction of every tip would have to differ from cycle to cycle to move the body as irregularly; where it was seen."""
     runs: tuple[ExplainedRun, ...]
     """The recordings."""
     warnings: tuple[str, ...]
@@ -373,6 +375,7 @@ def explain(
     discrepancy: float | None = None,
     matters: float | None = None,
     expected_impact: float | None = None,
+    scatter: float | None = None,
     current: bool | Literal["alone"] = False,
     progress: ProgressCallback | bool | None = None,
     wormd: StrPath | None = None,
@@ -388,6 +391,7 @@ def explain(
         discrepancy: what the model is taken to be wrong by everywhere, as a fraction of the largest deformation.
         matters: relative change of advance or energy that matters.
         expected_impact: how much of the advance an effect is expected to cost or bring.
+        scatter: how much the friction of a tip usually differs from one cycle to the next, as a fraction.
         current: takes the motor's current as evidence, too, or alone: then positions are not looked at.
         progress: is told stage and fraction. Without it progress is shown on standard error; False shows nothing.
         wormd: the program.
@@ -402,6 +406,7 @@ def explain(
         discrepancy=discrepancy,
         matters=matters,
         **{"expected-impact": expected_impact},
+        scatter=scatter,
     )
     if current:
         more.append("--current=alone" if current == "alone" else "--current")

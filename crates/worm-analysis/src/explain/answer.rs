@@ -118,6 +118,10 @@ pub struct Doubt {
     pub agrees_within_j: Option<f64>,
     /// Standard deviation that the model is taken to be wrong by everywhere, m.
     pub discrepancy_m: f64,
+    /// By how much of its friction each tip would have to differ from one cycle to the next to move the body as irregularly as the answer, or
+    /// what comes nearest, leaves it; none where nobody saw the body.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub friction_scatter: Option<f64>,
 }
 
 impl Default for Doubt {
@@ -130,6 +134,7 @@ impl Default for Doubt {
             agrees_within_m: f64::NAN,
             agrees_within_j: None,
             discrepancy_m: f64::NAN,
+            friction_scatter: None,
         }
     }
 }

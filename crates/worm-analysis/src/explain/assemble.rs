@@ -17,6 +17,7 @@ use crate::explain::search::fit::Fit;
 use crate::explain::search::judge::candidate::Candidate;
 use crate::explain::search::law::find::FoundLaw;
 use crate::explain::search::parameter::{Free, Onset, What};
+use crate::explain::worm::irregularity::friction_scatter;
 use crate::explain::worm::misstated_conditions::in_words;
 use crate::explain::worm::noise::RunNoise;
 use crate::explain::worm::nuisance::Nuisance;
@@ -112,9 +113,13 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
         let onset = Onset::from(change.cycle as f64, change.run);
         effects::found_onset(&worm.scene.observed, onset)
     });
+    let of_best = best
+        .filter(|_| verdict != Verdict::Agrees)
+        .unwrap_or(&parts.recalibrated);
+    let scatter = friction_scatter(worm, of_best);
     let remainder = (verdict == Verdict::OutsideLibrary).then(|| {
         let places = places(&maps_after, PLACES);
-        let period = period(worm, best.unwrap_or(&parts.recalibrated));
+        let period = period(worm, of_best);
         Remainder {
             description: match worm.sees_positions() {
                 true => words::remainder(found.open_share, &places),
@@ -152,6 +157,8 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
                 change.as_ref(),
                 "cycles",
             );
+            let irregular = scatter.filter(|_| verdict == Verdict::OutsideLibrary && selected.is_irregular);
+            let sentence = sentence + &irregular.map_or_else(String::new, words::irregularity);
             let but = suspicion.as_ref().map(|suspicion| format!(" But {suspicion}."));
             sentence + &but.unwrap_or_default()
         }
@@ -181,6 +188,7 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
             agrees_within_m: agrees_within_m(problem, &runs, final_fit, !named.is_empty()),
             agrees_within_j: agrees_within_j(worm, &runs, final_fit, !named.is_empty()),
             discrepancy_m: parts.discrepancy_m,
+            friction_scatter: scatter,
         },
         warnings,
         repairs: words::repairs(worm),

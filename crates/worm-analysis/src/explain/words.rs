@@ -77,6 +77,15 @@ pub(super) fn sentence(
     }
 }
 
+/// That the body moves more irregularly than tips make it, as a further sentence, by the scatter of the friction that it would take.
+pub(super) fn irregularity(scatter: f64) -> String {
+    format!(
+        " From one cycle to the next the body moves as irregularly as if the friction of every tip differed by {}: look for what shakes or tugs \
+         at the worm, or for a canal that is not even.",
+        percent(scatter)
+    )
+}
+
 /// The verdict where conditions that are stated wrongly are more probable than all else, with what to do about it.
 pub(super) fn misstated((what, what_to_do): (&str, &str), probability: f64) -> String {
     format!(

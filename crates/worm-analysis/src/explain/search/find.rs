@@ -37,6 +37,9 @@ pub struct Options {
     pub matters: f64,
     /// Relative change of the advance that an effect is expected to make, give or take a factor of 2.5; above 0.
     pub expected_impact: f64,
+    /// How much the friction of a tip usually differs from one cycle to the next, as a fraction, give or take a factor of two; above 0. What
+    /// scatters by much more is something that is missing.
+    pub scatter: f64,
     /// Names of effects that are left out of the search: what would it say if it did not know them?
     pub without: Vec<&'static str>,
     /// What of a worm's recordings is evidence.
@@ -62,6 +65,7 @@ impl Default for Options {
             discrepancy: 0.004,
             matters: 0.02,
             expected_impact: 0.06,
+            scatter: 0.01,
             without: Vec::new(),
             evidence: Evidence::Positions,
         }
@@ -110,7 +114,8 @@ pub(in crate::explain) fn find<P: Plant>(
         in_time: in_time.as_ref(),
         recalibrated,
         none: evidence(discrepancy, in_time.as_ref(), recalibrated, &|_| None)
-            .with_rhythm(plant.ln_bayes_of_rhythms(recalibrated)),
+            .with_rhythm(plant.ln_bayes_of_rhythms(recalibrated))
+            .with_irregularity(plant.ln_bayes_of_irregularity(recalibrated, options.scatter)),
         campaign: prior::Campaign {
             channels: plant.channels(),
             runs: plant.runs(),
@@ -119,6 +124,7 @@ pub(in crate::explain) fn find<P: Plant>(
         },
         limit: options.matters,
         expected_impact: options.expected_impact,
+        scatter: options.scatter,
     };
     let ln_prior = |one: &Hypothesised| judge.ln_prior(&[*one]) - prior::NONE.ln();
     let expected = Expected {

@@ -41,6 +41,8 @@ pub(in crate::explain) struct Judge<'j, P> {
     pub limit: f64,
     /// Relative change of an outcome that an effect is expected to make.
     pub expected_impact: f64,
+    /// What such a machine usually scatters by from cycle to cycle, as a fraction of what holds it.
+    pub scatter: f64,
 }
 
 impl<P: Plant> Judge<'_, P> {
@@ -74,6 +76,7 @@ impl<P: Plant> Judge<'_, P> {
         let rhythms = self.problem.plant.ln_bayes_of_rhythms(fit);
         evidence(self.discrepancy, self.in_time, fit, of_effect)
             .with_rhythm(rhythms)
+            .with_irregularity(self.problem.plant.ln_bayes_of_irregularity(fit, self.scatter))
             .less(excess)
     }
 

@@ -104,6 +104,11 @@ pub(in crate::explain) trait Plant: Recorded {
     /// Logarithms of the Bayes factors of rhythms in what a fit leaves: from cycle to cycle, and within the cycles; none where it cannot
     /// be told.
     fn ln_bayes_of_rhythms(&self, fit: &Fit) -> [Option<f64>; 2];
+    /// Logarithm of the Bayes factor of something irregular in what a fit leaves against what such a machine usually scatters by from cycle to
+    /// cycle, as a fraction of what holds it; none where it cannot be told.
+    fn ln_bayes_of_irregularity(&self, _fit: &Fit, _usual: f64) -> Option<f64> {
+        None
+    }
     /// 90 % interval of the fraction of the squared gap that one fit leaves open and another closes on data held out, down to noise and the
     /// discrepancy's scale; none where that is within its error.
     fn closed(&self, open: (&Fit, &[&FitWithout]), left: (&Fit, &[&FitWithout]), discrepancy: f64) -> Option<[f64; 2]>;

@@ -260,6 +260,7 @@ mod tests {
             },
             limit: 0.02,
             expected_impact: 0.06,
+            scatter: 0.01,
         };
         let (effects, values) = (&truth.0.hypothesised, &truth.1);
         let best = (!effects.is_empty()).then(|| {

@@ -10,7 +10,8 @@
 //!   `torque_noise`: how well that repeats; `torque_discrepancy`: what its model may be wrong by; `gears`: what is not known of the gears between motor and cam.
 //! - `gap`: how far a model is off, from the nominal one down to the noise floor.
 //! - `energy`: what cycles cost, over the `settled_cycles`; `matters`: whether an effect changes what anybody asks.
-//! - `period`: whether the residual repeats from cycle to cycle, `sway`: within the cycles, `wave`: how probable that is.
+//! - `period`: whether the residual repeats from cycle to cycle, `sway`: within the cycles, `wave`: how probable that is;
+//!   `irregularity`: whether the body moves more irregularly than tips make it.
 //! - `laws`: what a law that nobody listed may depend on.
 //! - `whole_effects`: what nuisances have of an effect's law, given to the effect; `speed_droop`: the one effect that shows in time alone.
 
@@ -19,6 +20,7 @@ pub(in crate::explain) mod clock;
 pub(in crate::explain) mod energy;
 pub(in crate::explain) mod gap;
 pub(in crate::explain) mod gears;
+pub(in crate::explain) mod irregularity;
 mod laws;
 pub(in crate::explain) mod matters;
 pub(in crate::explain) mod misstated_conditions;

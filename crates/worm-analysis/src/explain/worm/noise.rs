@@ -27,6 +27,9 @@ const APART: [usize; 3] = [1, 2, 3];
 const MUCH_LESS: f64 = 0.5;
 /// Fewest changes of the advance from which their variance is taken: a single change in mid-run shows in three of them.
 const MIN_DIFFERENCES: usize = 8;
+/// Fewest advances in a cycle that show a scatter about a line, and what the line takes of them.
+const MIN_ADVANCES: usize = 5;
+const OF_LINE: f64 = 2.0;
 /// Smallest variance of a position, and of the drift in a cycle, m².
 const MIN_M2: f64 = 1e-14;
 const MIN_DRIFT_M2: f64 = 1e-12;
@@ -35,6 +38,8 @@ const MIN_DRIFT_M2: f64 = 1e-12;
 #[derive(Debug, Clone)]
 pub(in crate::explain) struct RunNoise {
     drift: Drift,
+    /// Variance of what the body goes astray by in a cycle as it was measured, all at once or on the way, m².
+    walk_m2: f64,
     /// Variance of one sample that neighbouring samples do not share, and of what the samples of a bin share, m².
     white_m2: f64,
     shared_m2: f64,
@@ -67,11 +72,20 @@ impl RunNoise {
         let per_cycle_m2 = changes.of_cycles_m2().map_or(0.0, |m2| {
             (m2 * (1.0 - of_few(changes.cycles())) - 6.0 * of_cycle_m2) / WALK_OF_SECOND_DIFFERENCES
         });
-        let drift_m2 = per_step_m2.max(error_m2).max(per_cycle_m2).max(MIN_DRIFT_M2);
-        Self::new(observed, bins, [white_m2, shared_m2, along, drift_m2])
+        let measured_m2 = per_step_m2.max(per_cycle_m2).max(MIN_DRIFT_M2);
+        let drift_m2 = measured_m2.max(error_m2);
+        // What happens once in a cycle shows in one step of it, and in its advance.
+        let of_advances_m2 = changes.of_advances_m2().unwrap_or(0.0) - 2.0 * of_cycle_m2;
+        let walk_m2 = measured_m2.max(of_advances_m2);
+        Self::new(observed, bins, walk_m2, [white_m2, shared_m2, along, drift_m2])
     }
 
-    fn new(observed: &Observed<'_>, bins: &Bins, [white_m2, shared_m2, along, drift_m2]: [f64; 4]) -> Self {
+    fn new(
+        observed: &Observed<'_>,
+        bins: &Bins,
+        walk_m2: f64,
+        [white_m2, shared_m2, along, drift_m2]: [f64; 4],
+    ) -> Self {
         let cells = observed.cells();
         let mut relative_scale = Vec::with_capacity(bins.len() * cells);
         let mut body_m2 = Vec::with_capacity(bins.len());
@@ -99,6 +113,7 @@ impl RunNoise {
         let phase: Vec<f64> = bins.bins.iter().map(|bin| bin.phase).collect();
         Self {
             drift: Drift::new(&phase, &body_m2, drift_m2),
+            walk_m2,
             white_m2,
             shared_m2,
             along,
@@ -112,6 +127,7 @@ impl RunNoise {
         Self::new(
             observed,
             bins,
+            self.walk_m2,
             [white_m2, self.shared_m2, self.along, self.drift.per_cycle_m2()],
         )
     }
@@ -140,7 +156,12 @@ impl RunNoise {
         .smooth(body_m)
     }
 
-    /// Standard deviation of the body's random walk after one cycle, m.
+    /// Standard deviation of what the body goes astray by in a cycle as it was measured, all at once or on the way, m.
+    pub fn astray_per_cycle_m(&self) -> f64 {
+        self.walk_m2.sqrt()
+    }
+
+    /// Standard deviation of the body's random walk after one cycle, m; where its estimate is lost in its own error, as large as that.
     pub fn drift_per_cycle_m(&self) -> f64 {
         self.drift.per_cycle_m2().sqrt()
     }
@@ -166,6 +187,8 @@ struct CycleChanges {
     steps_m: Vec<Vec<f64>>,
     /// Of the body's mean advance in a cycle, m.
     cycles_m: Vec<f64>,
+    /// Advances of the body in a cycle beyond their mean and trend, m.
+    advances_m: Vec<f64>,
     per_step: usize,
 }
 
@@ -228,10 +251,12 @@ impl CycleChanges {
             .windows(3)
             .map(|three| three[2] - 2.0 * three[1] + three[0])
             .collect();
+        let advances_m: Vec<f64> = cycle_means.windows(2).map(|pair| pair[1] - pair[0]).collect();
         Self {
             relative_m,
             steps_m,
             cycles_m,
+            advances_m: beyond_line(&advances_m),
             per_step: bins.per_step,
         }
     }
@@ -275,12 +300,37 @@ impl CycleChanges {
         self.cycles_m.iter().filter(|change_m| change_m.is_finite()).count()
     }
 
+    /// Variance of the body's advance in a cycle about its mean and trend, m²; none with few cycles.
+    fn of_advances_m2(&self) -> Option<f64> {
+        let count = self.advances_m.len() as f64;
+        Some(variance(&self.advances_m)? * count / (count - OF_LINE))
+    }
+
     /// Variance of the change of the body's advance from cycle to cycle, m²; none with few cycles.
     fn of_cycles_m2(&self) -> Option<f64> {
         (self.cycles() >= MIN_DIFFERENCES)
             .then(|| variance(&self.cycles_m))
             .flatten()
     }
+}
+
+/// Values beyond the straight line through them; those that are not finite are left out. Empty of too few to show more than a line.
+fn beyond_line(values: &[f64]) -> Vec<f64> {
+    let seen: Vec<(f64, f64)> = values
+        .iter()
+        .enumerate()
+        .map(|(at, value)| (at as f64, *value))
+        .filter(|(_, value)| value.is_finite())
+        .collect();
+    if seen.len() < MIN_ADVANCES {
+        return Vec::new();
+    }
+    let mean_of = |of: &dyn Fn(&(f64, f64)) -> f64| mean(seen.iter().map(of));
+    let (middle, value) = (mean_of(&|(at, _)| *at), mean_of(&|(_, value)| *value));
+    let slope = mean_of(&|(at, here)| (at - middle) * (here - value)) / mean_of(&|(at, _)| (at - middle).powi(2));
+    seen.iter()
+        .map(|(at, here)| here - value - slope * (at - middle))
+        .collect()
 }
 
 /// Variance of values about 0 by the median of their squares; none where there are none.

@@ -3,6 +3,7 @@
 use super::binning::bins;
 use super::gap::closed;
 use super::gears;
+use super::irregularity;
 use super::laws::laws;
 use super::matters::impact;
 use super::misstated_conditions;
@@ -146,6 +147,10 @@ impl Plant for RecordedWorm<'_> {
         [period::ln_bayes(self, fit), sway::ln_bayes(self, fit)]
     }
 
+    fn ln_bayes_of_irregularity(&self, fit: &Fit, usual: f64) -> Option<f64> {
+        irregularity::ln_bayes(self, fit, usual)
+    }
+
     fn closed(
         &self,
         open: (&Fit, &[&FitWithout]),
@@ -181,6 +186,8 @@ impl Plant for RecordedWorm<'_> {
             self.torque_noise
                 .push(TorqueNoise::measure(observed, &self.bins[run], &torque_n_m));
         }
+        self.advance_by_friction_m =
+            irregularity::advance_by_friction_m(&self.scene, self.discrepancy_unit(), (hypothesis, at));
         Ok(())
     }
 

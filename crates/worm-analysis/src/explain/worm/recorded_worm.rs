@@ -24,6 +24,8 @@ pub(in crate::explain) struct RecordedWorm<'a> {
     pub bins: Vec<Bins>,
     pub noise: Vec<RunNoise>,
     pub torque_noise: Vec<TorqueNoise>,
+    /// How far a cycle's advance in each run goes with the friction of the tips, m ([`super::irregularity`]).
+    pub advance_by_friction_m: Vec<f64>,
 }
 
 /// A recorded worm, as a problem of least squares.
@@ -37,6 +39,7 @@ impl<'a> RecordedWorm<'a> {
             bins: Vec::new(),
             noise: Vec::new(),
             torque_noise: Vec::new(),
+            advance_by_friction_m: Vec::new(),
         }
     }
 

@@ -344,6 +344,7 @@ pub fn explained(cells: usize) -> Answer {
             agrees_within_m: 4.1e-5,
             agrees_within_j: None,
             discrepancy_m: 1.05e-5,
+            friction_scatter: Some(0.014),
         },
         runs: runs(&figures, true),
         warnings: vec!["up40.csv: 84 gaps of up to 0.06 s were bridged".to_owned()],

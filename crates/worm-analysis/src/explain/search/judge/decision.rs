@@ -62,6 +62,7 @@ impl Judged {
             of_usual: [f64::NEG_INFINITY; 4],
             changing: None,
             repeating: None,
+            irregular: None,
             of_law: None,
         })
     }
@@ -112,6 +113,8 @@ pub(in crate::explain) struct Selected {
     pub misstated_probability: f64,
     /// What changes in mid-run, where that is the most probable part of something else.
     pub change: Option<Change>,
+    /// Whether something irregular that moves the machine is that part.
+    pub is_irregular: bool,
     /// The best effect of another kind than what is named; where nothing is, the nearest.
     pub best_wrong: Option<Candidate>,
 }
@@ -237,6 +240,7 @@ pub(in crate::explain) fn decide(none: Evidence, judged: &[Judged], unfitted: &[
         })
     };
     let probability = chosen.iter().map(of_class).collect();
+    let (change, is_irregular) = what_else(none, &standing);
     let best_wrong = classes
         .iter()
         .find(|class| !is_named || !chosen.contains(&class.best))
@@ -249,19 +253,27 @@ pub(in crate::explain) fn decide(none: Evidence, judged: &[Judged], unfitted: &[
         null_probability,
         other_probability,
         misstated_probability,
-        change: change(none, &standing),
+        change,
+        is_irregular,
         best_wrong,
     }
 }
 
-/// The change in mid-run of the hypothesis that makes something else most probable, where it is that change and no large discrepancy.
-fn change(none: Evidence, standing: &[&Judged]) -> Option<Change> {
+/// What makes something else most probable, by the hypothesis beside which it is: a change in mid-run, or something irregular.
+fn what_else(none: Evidence, standing: &[&Judged]) -> (Option<Change>, bool) {
     let all = standing
         .iter()
         .map(|one| (one.ln_share + one.ln_other(), one.evidence()));
-    let (_, evidence) = all.chain([(none.other(), none)]).max_by(|a, b| a.0.total_cmp(&b.0))?;
-    let (ln_changing, change) = evidence.changing?;
-    (ln_changing > evidence.large.max(evidence.repeating.unwrap_or(f64::NEG_INFINITY))).then_some(change)
+    let best = all.chain([(none.other(), none)]).max_by(|a, b| a.0.total_cmp(&b.0));
+    let evidence = best.map_or(none, |(_, evidence)| evidence);
+    let [repeating, irregular] = [evidence.repeating, evidence.irregular].map(|ln| ln.unwrap_or(f64::NEG_INFINITY));
+    let others = evidence.large.max(repeating);
+    let change = evidence.changing.filter(|(ln, _)| *ln > others.max(irregular));
+    let ln_change = evidence.changing.map_or(f64::NEG_INFINITY, |(ln, _)| ln);
+    (
+        change.map(|(_, change)| change),
+        irregular > others.max(ln_change).max(evidence.usual),
+    )
 }
 
 #[cfg(test)]

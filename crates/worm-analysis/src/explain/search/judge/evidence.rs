@@ -54,6 +54,8 @@ pub(in crate::explain) struct Evidence {
     /// With a discrepancy of a₀ and something that repeats after some cycles, or of a₀ at most and a rhythm of the body; none where it was not
     /// asked.
     pub repeating: Option<f64>,
+    /// With a discrepancy of a₀ at most and something irregular that moves the body; none where it was not asked.
+    pub irregular: Option<f64>,
     /// With a law that nobody listed, and a discrepancy of the usual size; none where none was weighed.
     pub of_law: Option<f64>,
 }
@@ -75,12 +77,12 @@ impl InTime {
 }
 
 impl Evidence {
-    /// With something else wrong: a large discrepancy, a change in the middle of a run or a law, or a rhythm, each as probable before. Laws
-    /// are weighed where nothing is asked about the time.
+    /// With something else wrong: a large discrepancy, a change in the middle of a run or a law, a rhythm, or something irregular, each as
+    /// probable before. Laws are weighed where nothing is asked about the time.
     pub fn other(&self) -> f64 {
         let changing = self.changing.map(|(ln, _)| ln);
-        let kinds = [Some(self.large), changing, self.repeating, self.of_law];
-        ln_sum(kinds.into_iter().flatten()) - 3.0_f64.ln()
+        let kinds = [Some(self.large), changing, self.repeating, self.irregular, self.of_law];
+        ln_sum(kinds.into_iter().flatten()) - 4.0_f64.ln()
     }
 
     /// The same with a law that nobody listed.
@@ -107,6 +109,14 @@ impl Evidence {
         }
     }
 
+    /// The same with the Bayes factor of something irregular that moves the body.
+    pub fn with_irregularity(self, ln_bayes: Option<f64>) -> Self {
+        Self {
+            irregular: ln_bayes.map(|ln_bayes| at_most_unit(&self.of_usual) + ln_bayes),
+            ..self
+        }
+    }
+
     /// The same where all data have become less probable by a factor e^`excess`.
     pub fn less(self, excess: f64) -> Self {
         Self {
@@ -115,6 +125,7 @@ impl Evidence {
             of_usual: self.of_usual.map(|of_scale| of_scale - excess),
             changing: self.changing.map(|(ln, change)| (ln - excess, change)),
             repeating: self.repeating.map(|ln| ln - excess),
+            irregular: self.irregular.map(|ln| ln - excess),
             of_law: self.of_law.map(|ln| ln - excess),
         }
     }
@@ -251,6 +262,7 @@ pub(in crate::explain) fn evidence(
         repeating: repeating.map(|ln_bayes| at_unit + ln_bayes),
         large: ln_sum(LARGE.map(at_scale)) - (LARGE.len() as f64).ln(),
         of_usual,
+        irregular: None,
         of_law: None,
     }
 }

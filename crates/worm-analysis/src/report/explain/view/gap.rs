@@ -128,6 +128,12 @@ fn doubt(answer: &Answer) -> String {
             fixed(within_j * 1e3, 2)
         ));
     }
+    if let Some(scatter) = doubt.friction_scatter.filter(|scatter| scatter.is_finite()) {
+        parts.push(format!(
+            "From one cycle to the next the body moves as irregularly as if the friction of every tip differed by {}.",
+            percent(scatter)
+        ));
+    }
     parts.join(" ")
 }
 

@@ -18,6 +18,7 @@ fn of(usual: f64, large: f64) -> Evidence {
         of_usual: [usual - 4.0_f64.ln(); 4],
         changing: None,
         repeating: None,
+        irregular: None,
         of_law: None,
     }
 }
@@ -330,4 +331,31 @@ fn what_may_be_the_error_of_the_first_law_is_no_second_effect() {
         (second(1800.0, 18.0), second(100.0, 18.0), second(1800.0, 100.0)),
         (1, 2, 2)
     );
+}
+
+/// A body that moves too irregularly is something that is missing, with any effect beside it that does not calm it; one that moves as
+/// usual is none.
+#[test]
+fn what_moves_too_irregularly_is_outside_the_library() {
+    let with = |evidence: Evidence, ln_bayes: f64| evidence.with_irregularity(Some(ln_bayes));
+    for (ln_bayes, expected, is_irregular) in [
+        (-2.0, Verdict::Agrees, false),
+        (2.0, Verdict::Agrees, true),
+        (9.0, Verdict::OutsideLibrary, true),
+    ] {
+        let mut weak = judged(&["backlash"], 1.0, -5.0);
+        weak.candidate.evidence = weak.candidate.evidence.map(|evidence| with(evidence, ln_bayes));
+        let none = with(of(NONE_AT, NONE_AT - 10.0), ln_bayes);
+        let selected = decide(none, &[weak], &[], &[]);
+        assert_eq!(
+            (selected.verdict, selected.is_irregular),
+            (expected, is_irregular),
+            "{ln_bayes}"
+        );
+    }
+    // An effect after which the body moves as usual is named all the same.
+    let mut calming = judged(&["slick-patch"], 40.0, 0.0);
+    calming.candidate.evidence = calming.candidate.evidence.map(|evidence| with(evidence, -2.0));
+    let none = with(of(NONE_AT, NONE_AT - 10.0), 12.0);
+    assert_eq!(decide(none, &[calming], &[], &[]).verdict, Verdict::Explained);
 }
