@@ -338,7 +338,7 @@ class Explanation(Result):
     discrepancy_m: float
     """What the model is taken to be wrong by everywhere, m."""
     friction_scatter: float | None
-    """How much the friction of every tip would have to differ from cycle to cycle to move the body as irregularly; where it was seen."""
+    """What each tip's friction would have to differ by from cycle to cycle to move the body as irregularly, where that was seen."""
     runs: tuple[ExplainedRun, ...]
     """The recordings."""
     warnings: tuple[str, ...]
