@@ -116,7 +116,7 @@ pub(super) fn assemble(problem: &WormProblem<'_, '_>, config: &Config, parts: &P
     let of_best = best
         .filter(|_| verdict != Verdict::Agrees)
         .unwrap_or(&parts.recalibrated);
-    let scatter = friction_scatter(worm, of_best);
+    let scatter = friction_scatter(worm, &worm.predictions(of_best));
     let remainder = (verdict == Verdict::OutsideLibrary).then(|| {
         let places = places(&maps_after, PLACES);
         let period = period(worm, of_best);

@@ -114,8 +114,7 @@ pub(in crate::explain) fn find<P: Plant>(
         in_time: in_time.as_ref(),
         recalibrated,
         none: evidence(discrepancy, in_time.as_ref(), recalibrated, &|_| None)
-            .with_rhythm(plant.ln_bayes_of_rhythms(recalibrated))
-            .with_irregularity(plant.ln_bayes_of_irregularity(recalibrated, options.scatter)),
+            .with_body_motion(plant.body_motion(recalibrated, options.scatter)),
         campaign: prior::Campaign {
             channels: plant.channels(),
             runs: plant.runs(),

@@ -73,10 +73,9 @@ impl<P: Plant> Judge<'_, P> {
     /// The evidence of a fit with derivatives; `of_effect` gives the prior of each quantity that belongs to an effect.
     pub fn evidence_of(&self, fit: &Fit, of_effect: &dyn Fn(usize) -> Option<AtValue>) -> Evidence {
         let excess = 0.5 * self.problem.excess_of_repeating(self.recalibrated, fit);
-        let rhythms = self.problem.plant.ln_bayes_of_rhythms(fit);
+        let motion = self.problem.plant.body_motion(fit, self.scatter);
         evidence(self.discrepancy, self.in_time, fit, of_effect)
-            .with_rhythm(rhythms)
-            .with_irregularity(self.problem.plant.ln_bayes_of_irregularity(fit, self.scatter))
+            .with_body_motion(motion)
             .less(excess)
     }
 

@@ -82,6 +82,18 @@ pub(in crate::explain) struct PredictedRun {
     pub outcome: f64,
 }
 
+/// Logarithms of the Bayes factors of motions of the whole machine that do not go with its cycles, against scatter as usual; none where it
+/// cannot be told.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::explain) struct BodyMotion {
+    /// A rhythm from cycle to cycle, or along the way.
+    pub from_cycle_to_cycle: Option<f64>,
+    /// A rhythm within the cycles.
+    pub within_cycles: Option<f64>,
+    /// Something irregular.
+    pub irregular: Option<f64>,
+}
+
 /// A machine with its model.
 pub(in crate::explain) trait Plant: Recorded {
     /// Everything that is not known exactly and that no effect is about, with its prior.
@@ -101,13 +113,10 @@ pub(in crate::explain) trait Plant: Recorded {
     fn least_outcome(&self, run: usize) -> f64;
     /// What the effect in some place of a fitted hypothesis changes; `limit` is the relative change of outcome and energy that matters.
     fn impact(&self, fit: &Fit, place: usize, limit: f64) -> Impact;
-    /// Logarithms of the Bayes factors of rhythms in what a fit leaves: from cycle to cycle, and within the cycles; none where it cannot
-    /// be told.
-    fn ln_bayes_of_rhythms(&self, fit: &Fit) -> [Option<f64>; 2];
-    /// Logarithm of the Bayes factor of something irregular in what a fit leaves against what such a machine usually scatters by from cycle to
-    /// cycle, as a fraction of what holds it; none where it cannot be told.
-    fn ln_bayes_of_irregularity(&self, _fit: &Fit, _usual: f64) -> Option<f64> {
-        None
+    /// Evidence of motions that do not go with the gait in what a fit leaves; `usual_scatter` is what such a machine usually differs by from
+    /// cycle to cycle, as a fraction of what holds it. None unless the plant says so.
+    fn body_motion(&self, _fit: &Fit, _usual_scatter: f64) -> BodyMotion {
+        BodyMotion::default()
     }
     /// 90 % interval of the fraction of the squared gap that one fit leaves open and another closes on data held out, down to noise and the
     /// discrepancy's scale; none where that is within its error.

@@ -111,11 +111,6 @@ impl Plant for RecordedServo<'_> {
         impact
     }
 
-    /// There is no rhythm of cycles where there are no cycles.
-    fn ln_bayes_of_rhythms(&self, _fit: &Fit) -> [Option<f64>; 2] {
-        [None, None]
-    }
-
     fn closed(
         &self,
         open: (&Fit, &[&FitWithout]),

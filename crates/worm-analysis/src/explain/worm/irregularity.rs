@@ -9,9 +9,9 @@
 use super::noise::RunNoise;
 use super::nuisance::Nuisance;
 use super::predict::Scene;
+use super::predicted::Predicted;
 use super::recorded_worm::RecordedWorm;
 use super::residual::Residual;
-use crate::explain::search::fit::Fit;
 use crate::explain::search::hypothesis::Hypothesis;
 use crate::explain::search::parameter::Free;
 use crate::least_squares::Quantity;
@@ -28,8 +28,12 @@ const LEAST: f64 = 0.1;
 
 /// Logarithm of the Bayes factor of something irregular that moves the body against tips that scatter as usual, by what a fit leaves; none
 /// where nobody saw the body.
-pub(in crate::explain) fn ln_bayes(worm: &RecordedWorm<'_>, fit: &Fit, usual: f64) -> Option<f64> {
-    friction_scatter(worm, fit).map(|scatter| ln_bayes_of(scatter / usual))
+pub(in crate::explain) fn ln_bayes(
+    worm: &RecordedWorm<'_>,
+    predicted: &[Option<Predicted>],
+    usual: f64,
+) -> Option<f64> {
+    friction_scatter(worm, predicted).map(|scatter| ln_bayes_of(scatter / usual))
 }
 
 /// By what is measured over what is usual.
@@ -40,16 +44,14 @@ fn ln_bayes_of(ratio: f64) -> f64 {
 
 /// By how much of its friction each tip would have to scatter from cycle to cycle to move the body as irregularly as a fit leaves it; the
 /// geometric mean over the runs whose body was seen.
-pub(in crate::explain) fn friction_scatter(worm: &RecordedWorm<'_>, fit: &Fit) -> Option<f64> {
-    let runs = 0..worm.scene.observed.len();
-    let of_run = |run: usize| {
-        let observed = Some(&worm.scene.observed[run]).filter(|observed| observed.sees_positions)?;
-        let predicted = worm.scene.predict(run, &fit.hypothesis, &fit.at)?;
-        let residual = Residual::binned(observed, &worm.bins[run], &predicted);
-        let noise = RunNoise::measure(observed, &worm.bins[run], &residual);
+pub(in crate::explain) fn friction_scatter(worm: &RecordedWorm<'_>, predicted: &[Option<Predicted>]) -> Option<f64> {
+    let of_run = |(run, predicted): (usize, &Option<Predicted>)| {
+        let (observed, bins) = (&worm.scene.observed[run], &worm.bins[run]);
+        let residual = Residual::binned(observed, bins, predicted.as_ref()?);
+        let noise = RunNoise::measure(observed, bins, &residual);
         Some((noise.astray_per_cycle_m() / worm.advance_by_friction_m[run]).ln())
     };
-    let all: Vec<f64> = runs.filter_map(of_run).collect();
+    let all: Vec<f64> = predicted.iter().enumerate().filter_map(of_run).collect();
     (!all.is_empty()).then(|| (all.iter().sum::<f64>() / all.len() as f64).exp())
 }
 
@@ -112,7 +114,7 @@ mod tests {
             }
         }
         let worm = worm(&recordings, &campaign, &hypothesis(None));
-        let found = friction_scatter(&worm, &taken(&worm, hypothesis(None)));
+        let found = friction_scatter(&worm, &worm.predictions(&taken(&worm, hypothesis(None))));
         (found.expect("the body is seen"), worm.advance_by_friction_m)
     }
 

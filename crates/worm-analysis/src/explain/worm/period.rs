@@ -8,6 +8,8 @@
 //! How probable the wave is beside scatter of unknown size follows from the same fractions ([`super::wave`]), with a prior worth one cycle
 //! of each run. The mean over frequencies and both kinds of waves is the evidence.
 
+use super::observed::Observed;
+use super::predicted::Predicted;
 use super::recorded_worm::RecordedWorm;
 use super::residual::Residual;
 use super::sway;
@@ -51,8 +53,8 @@ struct Series {
 }
 
 /// Logarithm of the Bayes factor of a wave in the residual of a fit against scatter; none where no run is long enough.
-pub(in crate::explain) fn ln_bayes(worm: &RecordedWorm<'_>, fit: &Fit) -> Option<f64> {
-    ln_bayes_of(&displacements_of_all(worm, fit))
+pub(in crate::explain) fn ln_bayes(worm: &RecordedWorm<'_>, predicted: &[Option<Predicted>]) -> Option<f64> {
+    ln_bayes_of(&displacements_of_all(worm, predicted))
 }
 
 fn ln_bayes_of(series: &[Series]) -> Option<f64> {
@@ -79,12 +81,13 @@ fn ln_bayes_of(series: &[Series]) -> Option<f64> {
 /// The period of the residual of a fit: from cycle to cycle in time or along the canal, the clearer one where both are beyond chance,
 /// or else within the cycles.
 pub(in crate::explain) fn period(worm: &RecordedWorm<'_>, fit: &Fit) -> Period {
-    match period_of(&displacements_of_all(worm, fit)) {
+    let predicted = worm.predictions(fit);
+    match period_of(&displacements_of_all(worm, &predicted)) {
         Period {
             cycles: None,
             displacement_m: None,
         } => Period {
-            cycles: sway::period(worm, fit),
+            cycles: sway::period(worm, &predicted),
             displacement_m: None,
         },
         found => found,
@@ -112,16 +115,15 @@ fn period_of(series: &[Series]) -> Period {
     }
 }
 
-fn displacements_of_all(worm: &RecordedWorm<'_>, fit: &Fit) -> Vec<Series> {
-    let runs = 0..worm.scene.observed.len();
-    runs.filter_map(|run| displacements(worm, run, fit)).collect()
+fn displacements_of_all(worm: &RecordedWorm<'_>, predicted: &[Option<Predicted>]) -> Vec<Series> {
+    let runs = worm.scene.observed.iter().zip(predicted);
+    runs.filter_map(|(observed, predicted)| displacements(observed, predicted.as_ref()?))
+        .collect()
 }
 
 /// Displacement of the body in each settled cycle of a run beyond the model's.
-fn displacements(worm: &RecordedWorm<'_>, run: usize, fit: &Fit) -> Option<Series> {
-    let observed = Some(&worm.scene.observed[run]).filter(|observed| observed.sees_positions)?;
-    let predicted = worm.scene.predict(run, &fit.hypothesis, &fit.at)?;
-    let left = Residual::new(observed, &predicted);
+fn displacements(observed: &Observed<'_>, predicted: &Predicted) -> Option<Series> {
+    let left = Residual::new(observed, predicted);
     let from = observed.settled_from();
     let first = observed.phase.get(from)?;
     let count = observed.whole_cycles();

@@ -25,7 +25,7 @@ use crate::explain::search::impact::Impact;
 use crate::explain::search::law::offer::Offer;
 use crate::explain::search::misstatement::Misstatement;
 use crate::explain::search::parameter::{Free, Hypothesised};
-use crate::explain::search::plant::{Plant, PredictedRun, Recorded};
+use crate::explain::search::plant::{BodyMotion, Plant, PredictedRun, Recorded};
 use worm_physics::Physics;
 use worm_physics::effect::{Effect, LIBRARY, Scope};
 
@@ -143,12 +143,13 @@ impl Plant for RecordedWorm<'_> {
         impact(self, fit, place, limit)
     }
 
-    fn ln_bayes_of_rhythms(&self, fit: &Fit) -> [Option<f64>; 2] {
-        [period::ln_bayes(self, fit), sway::ln_bayes(self, fit)]
-    }
-
-    fn ln_bayes_of_irregularity(&self, fit: &Fit, usual: f64) -> Option<f64> {
-        irregularity::ln_bayes(self, fit, usual)
+    fn body_motion(&self, fit: &Fit, usual_scatter: f64) -> BodyMotion {
+        let predicted = self.predictions(fit);
+        BodyMotion {
+            from_cycle_to_cycle: period::ln_bayes(self, &predicted),
+            within_cycles: sway::ln_bayes(self, &predicted),
+            irregular: irregularity::ln_bayes(self, &predicted, usual_scatter),
+        }
     }
 
     fn closed(

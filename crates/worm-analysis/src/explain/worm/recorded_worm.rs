@@ -3,11 +3,13 @@
 use super::noise::RunNoise;
 use super::observed::Observed;
 use super::predict::Scene;
+use super::predicted::Predicted;
 use super::residual::Residual;
 use super::torque_discrepancy;
 use super::torque_noise::TorqueNoise;
 use crate::explain::search::bins::Bins;
 use crate::explain::search::discrepancy::repeating_columns;
+use crate::explain::search::fit::Fit;
 use crate::explain::search::plant::Recorded;
 use crate::explain::search::problem::FitProblem;
 use nalgebra::DMatrix;
@@ -46,6 +48,16 @@ impl<'a> RecordedWorm<'a> {
     /// The gait phase was recorded in some run.
     pub fn phase_recorded(&self) -> bool {
         self.scene.observed.iter().any(|observed| observed.phase_recorded)
+    }
+
+    /// What a fit predicts for each run; none of a run whose positions nobody saw, or that the worm could not have made.
+    pub fn predictions(&self, fit: &Fit) -> Vec<Option<Predicted>> {
+        let runs = self.scene.observed.iter().enumerate();
+        runs.map(|(run, observed)| {
+            let seen = observed.sees_positions.then_some(run)?;
+            self.scene.predict(seen, &fit.hypothesis, &fit.at)
+        })
+        .collect()
     }
 
     /// The least advance of a run that changes of it are relative to, m.

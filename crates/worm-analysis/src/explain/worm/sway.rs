@@ -7,11 +7,11 @@
 //! shows as a wave. A wave is held against scatter of unknown size by [`super::wave`]; of pure scatter, every direction of the
 //! series is as probable as any other.
 
+use super::predicted::Predicted;
 use super::recorded_worm::RecordedWorm;
 use super::residual::Residual;
 use super::wave::ln_bayes_of_fraction;
 use crate::explain::search::bins::Bins;
-use crate::explain::search::fit::Fit;
 use crate::explain::search::judge::ln_sum::ln_mean;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -32,26 +32,23 @@ const VANISHING: f64 = 1e-6;
 
 /// Logarithm of the Bayes factor of a wave in what the body does within the cycles beyond a fit, against scatter; none where no run is
 /// long enough.
-pub(in crate::explain) fn ln_bayes(worm: &RecordedWorm<'_>, fit: &Fit) -> Option<f64> {
-    ln_bayes_of(&tables(worm, fit))
+pub(in crate::explain) fn ln_bayes(worm: &RecordedWorm<'_>, predicted: &[Option<Predicted>]) -> Option<f64> {
+    ln_bayes_of(&tables(worm, predicted))
 }
 
 /// Period of the wave, cycles, where there clearly is one.
-pub(in crate::explain) fn period(worm: &RecordedWorm<'_>, fit: &Fit) -> Option<f64> {
-    period_of(&tables(worm, fit))
+pub(in crate::explain) fn period(worm: &RecordedWorm<'_>, predicted: &[Option<Predicted>]) -> Option<f64> {
+    period_of(&tables(worm, predicted))
 }
 
 /// The table of each run that is long enough, beyond mean and trend over its rows.
-fn tables(worm: &RecordedWorm<'_>, fit: &Fit) -> Vec<DMatrix<f64>> {
-    let runs = 0..worm.scene.observed.len();
-    let table = |run: usize| {
-        let observed = Some(&worm.scene.observed[run]).filter(|observed| observed.sees_positions)?;
-        let predicted = worm.scene.predict(run, &fit.hypothesis, &fit.at)?;
-        let bins = &worm.bins[run];
-        let left = Residual::binned(observed, bins, &predicted);
+fn tables(worm: &RecordedWorm<'_>, predicted: &[Option<Predicted>]) -> Vec<DMatrix<f64>> {
+    let table = |(run, predicted): (usize, &Option<Predicted>)| {
+        let (observed, bins) = (&worm.scene.observed[run], &worm.bins[run]);
+        let left = Residual::binned(observed, bins, predicted.as_ref()?);
         beyond_drifts(&increments_m(bins, &left.body_m, observed.settled_from()))
     };
-    runs.filter_map(table).collect()
+    predicted.iter().enumerate().filter_map(table).collect()
 }
 
 /// The body's increments from each bin to the next, a row for each whole cycle from some sample on; 0 where they were not seen.

@@ -16,7 +16,7 @@
 use super::super::discrepancy::Discrepancy;
 use super::super::fit::Fit;
 use super::super::normal_probability::normal_probability;
-use super::super::plant::Recorded;
+use super::super::plant::{BodyMotion, Recorded};
 use super::beside::Fitted;
 use super::ln_sum::{ln_mean, ln_sum};
 use super::repetition::Repetitions;
@@ -90,14 +90,18 @@ impl Evidence {
         Self { of_law, ..self }
     }
 
-    /// The same with the Bayes factors of a rhythm of the body, from cycle to cycle and within the cycles, of which as much is expected.
+    /// The same with what the body does beside its gait: a rhythm from cycle to cycle or within the cycles, of which as much is expected, or
+    /// something irregular.
     ///
     /// From cycle to cycle a canal that is not quite even makes small waves, which a discrepancy of a₀ has to be too small for. What the
     /// body does within the cycles is held against its own scatter alone, so only a discrepancy above a₀ might take its place.
-    pub fn with_rhythm(self, [from_cycle_to_cycle, within]: [Option<f64>; 2]) -> Self {
+    pub fn with_body_motion(self, motion: BodyMotion) -> Self {
+        let at_most_unit = at_most_unit(&self.of_usual);
         let of_body: Vec<f64> = [
-            from_cycle_to_cycle.map(|ln_bayes| at_unit(&self.of_usual) + ln_bayes),
-            within.map(|ln_bayes| at_most_unit(&self.of_usual) + ln_bayes),
+            motion
+                .from_cycle_to_cycle
+                .map(|ln_bayes| at_unit(&self.of_usual) + ln_bayes),
+            motion.within_cycles.map(|ln_bayes| at_most_unit + ln_bayes),
         ]
         .into_iter()
         .flatten()
@@ -105,14 +109,7 @@ impl Evidence {
         let both: Vec<f64> = [self.repeating, ln_mean(&of_body)].into_iter().flatten().collect();
         Self {
             repeating: ln_mean(&both),
-            ..self
-        }
-    }
-
-    /// The same with the Bayes factor of something irregular that moves the body.
-    pub fn with_irregularity(self, ln_bayes: Option<f64>) -> Self {
-        Self {
-            irregular: ln_bayes.map(|ln_bayes| at_most_unit(&self.of_usual) + ln_bayes),
+            irregular: motion.irregular.map(|ln_bayes| at_most_unit + ln_bayes),
             ..self
         }
     }

@@ -4,6 +4,7 @@ use super::*;
 use crate::explain::search::fit::Fit;
 use crate::explain::search::hypothesis::Hypothesis;
 use crate::explain::search::parameter::{Hypothesised, Onset};
+use crate::explain::search::plant::BodyMotion;
 use crate::explain::words;
 use crate::explain::worm::plant::hypotheses;
 use crate::least_squares::Estimate;
@@ -337,7 +338,12 @@ fn what_may_be_the_error_of_the_first_law_is_no_second_effect() {
 /// usual is none.
 #[test]
 fn what_moves_too_irregularly_is_outside_the_library() {
-    let with = |evidence: Evidence, ln_bayes: f64| evidence.with_irregularity(Some(ln_bayes));
+    let with = |evidence: Evidence, ln_bayes: f64| {
+        evidence.with_body_motion(BodyMotion {
+            irregular: Some(ln_bayes),
+            ..BodyMotion::default()
+        })
+    };
     for (ln_bayes, expected, is_irregular) in [
         (-2.0, Verdict::Agrees, false),
         (2.0, Verdict::Agrees, true),
@@ -354,7 +360,7 @@ fn what_moves_too_irregularly_is_outside_the_library() {
         );
     }
     // An effect after which the body moves as usual is named all the same.
-    let mut calming = judged(&["slick-patch"], 40.0, 0.0);
+    let mut calming = judged(&["wear"], 40.0, 0.0);
     calming.candidate.evidence = calming.candidate.evidence.map(|evidence| with(evidence, -2.0));
     let none = with(of(NONE_AT, NONE_AT - 10.0), 12.0);
     assert_eq!(decide(none, &[calming], &[], &[]).verdict, Verdict::Explained);
