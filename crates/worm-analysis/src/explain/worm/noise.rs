@@ -39,7 +39,7 @@ const MIN_DRIFT_M2: f64 = 1e-12;
 pub(in crate::explain) struct RunNoise {
     drift: Drift,
     /// Variance of what the body goes astray by in a cycle as it was measured, all at once or on the way, m².
-    walk_m2: f64,
+    astray_m2: f64,
     /// Variance of one sample that neighbouring samples do not share, and of what the samples of a bin share, m².
     white_m2: f64,
     shared_m2: f64,
@@ -76,14 +76,14 @@ impl RunNoise {
         let drift_m2 = measured_m2.max(error_m2);
         // What happens once in a cycle shows in one step of it, and in its advance.
         let of_advances_m2 = changes.of_advances_m2().unwrap_or(0.0) - 2.0 * of_cycle_m2;
-        let walk_m2 = measured_m2.max(of_advances_m2);
-        Self::new(observed, bins, walk_m2, [white_m2, shared_m2, along, drift_m2])
+        let astray_m2 = measured_m2.max(of_advances_m2);
+        Self::new(observed, bins, astray_m2, [white_m2, shared_m2, along, drift_m2])
     }
 
     fn new(
         observed: &Observed<'_>,
         bins: &Bins,
-        walk_m2: f64,
+        astray_m2: f64,
         [white_m2, shared_m2, along, drift_m2]: [f64; 4],
     ) -> Self {
         let cells = observed.cells();
@@ -113,7 +113,7 @@ impl RunNoise {
         let phase: Vec<f64> = bins.bins.iter().map(|bin| bin.phase).collect();
         Self {
             drift: Drift::new(&phase, &body_m2, drift_m2),
-            walk_m2,
+            astray_m2,
             white_m2,
             shared_m2,
             along,
@@ -127,7 +127,7 @@ impl RunNoise {
         Self::new(
             observed,
             bins,
-            self.walk_m2,
+            self.astray_m2,
             [white_m2, self.shared_m2, self.along, self.drift.per_cycle_m2()],
         )
     }
@@ -158,7 +158,7 @@ impl RunNoise {
 
     /// Standard deviation of what the body goes astray by in a cycle as it was measured, all at once or on the way, m.
     pub fn astray_per_cycle_m(&self) -> f64 {
-        self.walk_m2.sqrt()
+        self.astray_m2.sqrt()
     }
 
     /// Standard deviation of the body's random walk after one cycle, m; where its estimate is lost in its own error, as large as that.
