@@ -8,7 +8,7 @@ use super::judge::decision::{Selected, decide};
 use super::judge::evidence::{InTime, evidence};
 use super::judge::prior;
 use super::judgement::{FALSE_NAMES, Judge, WORTH_A_LOOK, held_out};
-use super::law::find::FittedLaws;
+use super::law::find::{FittedLaws, OfLibrary};
 use super::law::fit::LawSearch;
 use super::misstated::{Misstated, misstated};
 use super::onset::{mean_cycles, with_onsets};
@@ -207,24 +207,31 @@ pub(in crate::explain) fn find<P: Plant>(
     let misstated = misstated(&judge, best);
     let of_misstated: Vec<f64> = misstated.iter().map(|one| one.ln_weight).collect();
     let mut selected = decide(judge.none, &judged, &unfitted, &of_misstated);
-    // What nobody listed can look like an effect or like wrong conditions, and may be what is missing as well as they.
+    // What nobody listed can look like an effect, a pair or wrong conditions, and may be what is missing as well as they.
     let has_answer = matches!(selected.verdict, Verdict::Explained | Verdict::Ambiguous) || selected.is_misstated();
-    let laws = (has_answer || plant.weighs_laws()).then(|| {
-        let search = LawSearch {
-            problem,
-            discrepancy,
-            recalibrated,
-            without: &recalibrated_held_out,
-            folds: &folds,
-        };
-        search.fit(&mut |fraction| report("laws", 0.9 + 0.05 * fraction))
-    });
+    let search = LawSearch {
+        problem,
+        discrepancy,
+        recalibrated,
+        without: &recalibrated_held_out,
+        folds: &folds,
+    };
+    let mut laws =
+        (has_answer || plant.weighs_laws()).then(|| search.fit(&mut |fraction| report("laws", 0.9 + 0.05 * fraction)));
+    let names_pair = has_answer && selected.candidates.first().is_some_and(Candidate::is_pair);
+    // Singles that predict as well as a pair, but are far less probable, are no reason for the pair.
     let gains = judged
         .iter()
-        .filter(|one| one.holds)
+        .filter(|one| one.holds && (one.candidate.is_pair() || !names_pair))
         .filter_map(|one| Some(recalibrated_held_out.chi_squared - one.candidate.held_out.as_ref()?.chi_squared));
     let gain = gains.fold(0.0, f64::max);
-    let of_law = laws.as_ref().and_then(|laws| laws.ln_evidence(discrepancy, gain));
+    let of_law = laws.as_mut().and_then(|laws| {
+        if !names_pair {
+            return laws.ln_evidence(discrepancy, OfLibrary::Single(gain));
+        }
+        search.fit_best_anew(laws);
+        laws.ln_evidence(discrepancy, OfLibrary::Pair(gain))
+    });
     if of_law.is_some() {
         selected = decide(judge.none.with_law(of_law), &judged, &unfitted, &of_misstated);
     }

@@ -212,7 +212,7 @@ fn stages(
         single.hypothesised.iter().all(|one| all.contains(one))
     };
     let singles = || found.fitted.iter().filter(|one| one.hypothesised.len() == 1);
-    let is_pair = named.first().is_some_and(|first| first.named().count() > 1);
+    let is_pair = named.first().is_some_and(|first| first.is_pair());
     let mut steps: Vec<ServoStage> = singles()
         .filter(|single| is_pair && is_named(single))
         .map(|single| stage(StageKind::Step, single))

@@ -53,6 +53,11 @@ impl Candidate {
         all.filter(|(place, _)| self.trace != Some(*place))
     }
 
+    /// Whether it names two effects.
+    pub fn is_pair(&self) -> bool {
+        self.named().count() > 1
+    }
+
     /// Whether every effect in it is strong enough to matter, of a sense that it can have, with its severity, its shape and the time for
     /// which it acts off their limits: scatter from cycle to cycle looks like a little of many effects, and what is driven to its limit fits
     /// something else.

@@ -76,10 +76,6 @@ impl Judged {
         self.evidence().other() - 0.5 * LAW_KNOWN * LAW_KNOWN * self.candidate.improvement.max(0.0)
     }
 
-    fn is_pair(&self) -> bool {
-        self.candidate.named().count() > 1
-    }
-
     /// Probability that it does not count as none: chance does less, and something that matters changes. It must be sure to, unless no
     /// other effect comes into question: of two doubts, which it is and whether it matters, an answer may leave one.
     fn counts(&self, is_alone: bool) -> f64 {
@@ -135,7 +131,7 @@ struct Class {
 /// Reaches the verdict. `none` is the evidence without effects, `unfitted` the logarithm of the weights of effects that were only
 /// screened, `misstated` those of conditions that are stated wrongly.
 pub(in crate::explain) fn decide(none: Evidence, judged: &[Judged], unfitted: &[f64], misstated: &[f64]) -> Selected {
-    let singles = judged.iter().filter(|one| !one.is_pair());
+    let singles = judged.iter().filter(|one| !one.candidate.is_pair());
     let best_single = singles.max_by(|a, b| a.ln_weight().total_cmp(&b.ln_weight()));
     // An effect whose law is a little wrong is no reason for another law.
     let strongest = judged.iter().map(|one| one.candidate.improvement).fold(0.0, f64::max);
@@ -146,7 +142,8 @@ pub(in crate::explain) fn decide(none: Evidence, judged: &[Judged], unfitted: &[
     // The law of the first effect is no better known than to a fraction of what it does.
     let is_beyond_first = |pair: &Judged| pair.candidate.improvement - gain > FIRST_LAW_KNOWN * FIRST_LAW_KNOWN * gain;
     let needs_both = |one: &Judged| {
-        !one.is_pair() || (one.ln_weight() - ln_single > SECOND.ln() && one.may_be_named(false) && is_beyond_first(one))
+        !one.candidate.is_pair()
+            || (one.ln_weight() - ln_single > SECOND.ln() && one.may_be_named(false) && is_beyond_first(one))
     };
     let mut order: Vec<usize> = (0..judged.len()).filter(|&at| needs_both(&judged[at])).collect();
     order.sort_by(|&a, &b| judged[b].ln_weight().total_cmp(&judged[a].ln_weight()));
@@ -170,7 +167,9 @@ pub(in crate::explain) fn decide(none: Evidence, judged: &[Judged], unfitted: &[
     // The one that comes into question, where there is one.
     let of_all = ln_sum(classes.iter().map(|class| class.ln_weight));
     let alone = classes.first().filter(|first| first.ln_weight - of_all > SURE.ln());
-    let alone = alone.map(|first| &judged[first.best]).filter(|one| !one.is_pair());
+    let alone = alone
+        .map(|first| &judged[first.best])
+        .filter(|one| !one.candidate.is_pair());
     let is_alone = |one: &Judged| alone.is_some_and(|alone| are_alike(&alone.candidate, &one.candidate));
     let counts = |one: &Judged| one.counts(is_alone(one));
     let may_be_named = |one: &Judged| one.may_be_named(is_alone(one));

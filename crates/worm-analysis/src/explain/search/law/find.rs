@@ -26,7 +26,8 @@ const WORTH: f64 = 2.0;
 const NEAR: f64 = 60.0;
 /// Fall of the score on data held out from which there is a law.
 const CLAIMS: f64 = 12.0;
-/// Fall of that score by which the best law must exceed another for the other not to be named beside it.
+/// Fall of that score by which the best law must exceed another for the other not to be named beside it, or a pair of effects for a law not to
+/// come into question.
 const RIVAL: f64 = 4.0;
 
 /// The law that explains most, and what is nearly as good.
@@ -53,13 +54,28 @@ pub(in crate::explain) struct FittedLaws {
     each: Vec<(FittedLaw, Weighed)>,
     /// How many were offered.
     offered: usize,
+    /// Whether the best were fitted anew about what was found.
+    is_anew: bool,
+}
+
+/// Fall of the score on data held out by what the library says; 0 where nothing of it holds.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::explain) enum OfLibrary {
+    /// One effect at most. A law bends to whatever an effect leaves, so it must predict better.
+    Single(f64),
+    /// Two effects, which bend to as much as a law over one quantity does: such a law need only predict about as well.
+    Pair(f64),
 }
 
 impl FittedLaws {
-    /// Logarithm of the probability of the data under some law, whichever, of those whose score on data held out falls by so much more than
-    /// that of the library (0 where nothing of it holds) that there is a law; none without such a law.
-    pub fn ln_evidence(&self, discrepancy: &Discrepancy, of_library: f64) -> Option<f64> {
-        let better = self.each.iter().filter(|(law, _)| law.gain > of_library + CLAIMS);
+    /// Logarithm of the probability of the data under some law, whichever, of those that predict data held out well enough beside the library
+    /// for there to be a law; none without such a law.
+    pub fn ln_evidence(&self, discrepancy: &Discrepancy, of_library: OfLibrary) -> Option<f64> {
+        let least = |shape: &LawShape| match of_library {
+            OfLibrary::Pair(gain) if shape.axes.len() == 1 => gain - RIVAL,
+            OfLibrary::Single(gain) | OfLibrary::Pair(gain) => gain + CLAIMS,
+        };
+        let better = self.each.iter().filter(|(law, _)| law.gain > least(&law.shape));
         let of_each = better.map(|(law, of)| evidence(discrepancy, None, &law.fit, &|_| None).usual + of.ln_form);
         let all: Vec<f64> = of_each.collect();
         (!all.is_empty()).then(|| ln_sum(all) - (self.offered as f64).ln())
@@ -104,16 +120,27 @@ impl<P: Plant> LawSearch<'_, '_, P> {
         FittedLaws {
             each: fitted.collect(),
             offered,
+            is_anew: false,
         }
     }
 
+    /// Fits those that predict best anew, unless they were; best first.
+    pub fn fit_best_anew(&self, laws: &mut FittedLaws) {
+        if std::mem::replace(&mut laws.is_anew, true) {
+            return;
+        }
+        let each = &mut laws.each;
+        each.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
+        each.par_iter_mut()
+            .take(ANEW)
+            .for_each(|(law, of)| self.fit_anew(law, of));
+        each.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
+    }
+
     /// The law that closes the gap of a recalibrated plant; none where nothing predicts better than no law.
-    pub fn best(&self, laws: FittedLaws, report: &mut dyn FnMut(f64)) -> Option<FoundLaw> {
-        let mut fitted = laws.each;
-        fitted.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
-        let promising = fitted.par_iter_mut().take(ANEW);
-        promising.for_each(|(law, of)| self.fit_anew(law, of));
-        fitted.sort_by(|a, b| b.0.gain.total_cmp(&a.0.gain));
+    pub fn best(&self, mut laws: FittedLaws, report: &mut dyn FnMut(f64)) -> Option<FoundLaw> {
+        self.fit_best_anew(&mut laws);
+        let fitted = laws.each;
         let best = fitted.first().map(|(law, _)| law.gain).filter(|gain| *gain >= CLAIMS)?;
         let near = fitted.into_iter().filter(|(law, _)| law.gain > best - RIVAL);
         let mut fitted: Vec<(FittedLaw, Weighed)> = near
