@@ -105,6 +105,15 @@ impl Onset {
         }
     }
 
+    /// The same so many cycles later.
+    pub fn moved(self, cycles: f64) -> Self {
+        Self {
+            begins: self.begins.map(|begins| begins + cycles),
+            ends: self.ends.map(|ends| ends + cycles),
+            ..self
+        }
+    }
+
     /// Whether it begins and ends again.
     pub fn comes_and_goes(&self) -> bool {
         self.begins.is_some() && self.ends.is_some()
