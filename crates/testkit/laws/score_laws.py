@@ -38,7 +38,7 @@ AXES = {
     "tether-drag": {"place", "time"},
     "lost-stroke": {"cell", "phase"},
     "actuator-compliance": {"load", "deformation"},
-    "backlash": {"phase"},
+    "backlash": {"load", "deformation"},
     "step-overlap": {"phase"},
     "slick-patch": {"place"},
     "wear": {"time"},

@@ -21,6 +21,7 @@ SPLITS = {
     "sample": (9_100_007, (1, 1, 1, 0)),
     "development": (41_600_000, (12, 24, 8, 4)),
     "development-clean": (41_700_000, (40, 0, 0, 0)),
+    "development-single": (41_800_000, (0, 220, 0, 0)),
     "sealed": (73_200_000, (66, 132, 54, 12)),
 }
 KINDS = ("clean", "single", "stranger", "onset")

@@ -20,6 +20,7 @@ mod tests;
 use super::ledger::Ledger;
 use super::mechanics::Mechanics;
 use super::pad::{Hold, Loaded, Pad, Rate};
+use super::play::Play;
 use super::table::Whereabouts;
 use super::worm::SlidesDown;
 use crate::{MAX_CELLS, MAX_TABLES};
@@ -66,7 +67,8 @@ pub struct Crawl {
 struct Cell {
     pad: Pad,
     drive_m: f64,
-    drag_n: f64, // on the cell, in the last increment, and the push of tables
+    drag_n: f64,   // on the cell, in the last increment, and the push of tables
+    behind_m: f64, // in the drive's play, by its middle
     // These six only where there are tables.
     speed_m_s: f64,
     strain_m_s: f64, // of its pad
@@ -87,6 +89,7 @@ struct Trial {
     friction: f64,
     hold: Hold,
     shift_m: f64,
+    play: Option<Play>, // of the drive, where there is any
     loaded: Loaded,
     /// At the increment's start, for tables.
     here: Whereabouts,
@@ -377,6 +380,12 @@ impl Crawl {
                 cell.trial.driven_m += target_m[0] - before_m[0] + follows_m;
             }
             cell.trial.hold = mechanics.pad[index].hold(&cell.pad, cell.trial.friction, step_s);
+            cell.trial.play = (laws.play_m > 0.0).then(|| Play {
+                half_m: 0.5 * laws.play_m,
+                behind_m: cell.behind_m + cell.trial.driven_m,
+                yields_m_per_n: step_s / laws.play_damping_n_s_per_m,
+                standing_n: mechanics.standing_n[index],
+            });
         }
         let (damping_n_s_per_m, mass_kg) = match self.damping_ratio {
             Some(ratio) => (ratio * mechanics.critical_n_s_per_m, mechanics.mass_kg),
@@ -425,11 +434,18 @@ impl Crawl {
                 shift_m,
                 loaded,
                 pushed_n,
+                play,
                 ..
             } = cell.trial;
             let (law, standing_n) = (&mechanics.pad[index], mechanics.standing_n[index]);
             let (before_m, before_n) = (cell.pad.deformation_m, cell.pad.force_n);
-            let lost_j = law.take(&mut cell.pad, &loaded, increment.step_s, increment.rate);
+            let mut lost_j = law.take(&mut cell.pad, &loaded, increment.step_s, increment.rate);
+            if let Some(play) = play {
+                // As if the drive bore the load across the play, too: it is small there.
+                let behind_m = play.behind_m(loaded.force_n).0;
+                lost_j += (0.5 * (before_n + loaded.force_n) + standing_n) * (behind_m - cell.behind_m);
+                cell.behind_m = behind_m;
+            }
             let drag_n = increment.drag_n_per_m * shift_m + pushed_n;
             let dragged_j = 0.5 * (cell.drag_n + drag_n) * shift_m;
             let ledger = &mut self.ledger;

@@ -46,6 +46,7 @@ mod mechanics;
 pub mod motion;
 mod pad;
 mod physics;
+mod play;
 pub mod servo;
 pub mod study;
 mod table;

@@ -119,8 +119,7 @@ impl Mechanics {
             steps -= cells;
         }
         let fraction = self.rounded((steps / (1.0 + overlap)).min(1.0));
-        let play_m = self.laws.play_m.min(stroke_m);
-        turns * (stroke_m - play_m) + (stroke_m * fraction - play_m).max(0.0)
+        stroke_m * (turns + fraction)
     }
 
     /// Rate at which the drive moves a cell in the body, m per cycle of phase.
@@ -128,9 +127,8 @@ impl Mechanics {
         let cells = self.worm.cells() as f64;
         let steps = (cam.steps - self.place_of[cell] as f64 + self.laws.overlap).rem_euclid(cells);
         let fraction = steps / (1.0 + self.laws.overlap);
-        let stroke_m = self.worm.stroke_of_m(cell);
-        if fraction < 1.0 && stroke_m * self.rounded(fraction) >= self.laws.play_m {
-            stroke_m * self.speed(fraction) * cells / (1.0 + self.laws.overlap)
+        if fraction < 1.0 {
+            self.worm.stroke_of_m(cell) * self.speed(fraction) * cells / (1.0 + self.laws.overlap)
         } else {
             0.0
         }

@@ -29,8 +29,10 @@ pub struct Laws {
     pub tether_n_per_m: f64,
     /// Compliance of the drive that holds each cell in the body, m/N; 0 or more.
     pub compliance_m_per_n: f64,
-    /// Play that the drive runs through before a stepping cell follows, m; 0 or more.
+    /// Play between the drive and each cell, m; 0 or more: the cell stands where its load pushes it to.
     pub play_m: f64,
+    /// Damping of a cell against the body while it crosses the play, N s/m; above 0.
+    pub play_damping_n_s_per_m: f64,
     /// By what share of a step each step begins early; 0 to 0.5.
     pub overlap: f64,
     /// Share of a step in which the cam brings a cell to speed, and the same to rest: rounded corners; 0 to 0.5.
@@ -67,6 +69,7 @@ impl Default for Laws {
             tether_n_per_m: 0.0,
             compliance_m_per_n: 0.0,
             play_m: 0.0,
+            play_damping_n_s_per_m: 20.0,
             overlap: 0.0,
             rounding: 0.0,
             patch: Patch {
@@ -100,6 +103,9 @@ impl Laws {
         }
         if laws.creep_share == 0.0 {
             laws.creep_time_s = standard.creep_time_s;
+        }
+        if laws.play_m == 0.0 {
+            laws.play_damping_n_s_per_m = standard.play_damping_n_s_per_m;
         }
         if laws.patch.friction_factor == 1.0 || laws.patch.length_m == 0.0 {
             laws.patch = standard.patch;
@@ -176,7 +182,7 @@ impl Physics {
         worm
     }
 
-    /// The same worm seen from the other end of the canal, as [`Worm::mirrored`]. Play and overlap keep to the beginning of each
+    /// The same worm seen from the other end of the canal, as [`Worm::mirrored`]. Overlap keeps to the beginning of each
     /// step, which in reverse was its end: a cycle's totals do not depend on that.
     pub fn mirrored(mut self) -> Self {
         self.worm = self.worm.mirrored();

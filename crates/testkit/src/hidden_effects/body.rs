@@ -14,6 +14,8 @@ use crate::nominal::{GRAVITY_M_S2, LOWERING_S};
 
 /// Time in which a cell held by a compliant drive follows its force, s: far below any step, far above the time step.
 const FOLLOW_S: f64 = 2e-3;
+/// Resistance of the grease in the drive's play to a cell that crosses it, N s/m: in a few milliseconds.
+const GREASE_N_S_PER_M: f64 = 5.0;
 
 /// A worm with what is hidden in it.
 #[derive(Debug, Clone)]
@@ -134,6 +136,8 @@ pub struct Motion<'a> {
     extension_m: [f64; MAX_CELLS],
     /// How far the drive's compliance holds each cell back, m.
     stand_off_m: [f64; MAX_CELLS],
+    /// How far back from the middle of the drive's play each cell is, m.
+    in_play_m: [f64; MAX_CELLS],
     mean_m: f64,
     /// Positive work of the drive so far (13), J.
     pub work_j: f64,
@@ -183,6 +187,7 @@ impl<'a> Motion<'a> {
             tips: position_m.map(Tip::laid_down),
             extension_m: cam_profile.extensions_m(phase),
             stand_off_m: [0.0; MAX_CELLS],
+            in_play_m: [0.0; MAX_CELLS],
             mean_m,
             work_j: 0.0,
             drive_j: 0.0,
@@ -205,6 +210,7 @@ impl<'a> Motion<'a> {
         for cell in 0..self.cells {
             self.extension_offset_m[cell] += before_m[cell] - after_m[cell];
         }
+        self.in_play_m = [0.0; MAX_CELLS];
         self.pads = self.worm.pads(&self.deviations);
         let load = Load::of(self.worm, &self.deviations, self.placement);
         self.momentum_n_s *= load.mass_kg / self.mass_kg;
@@ -245,8 +251,19 @@ impl<'a> Motion<'a> {
             self.stand_off_m[cell] += follow * (held_m - self.stand_off_m[cell]);
             *extension_m += self.extension_offset_m[cell] - self.stand_off_m[cell];
         }
+        // A cell's load pushes it through the drive's play to one flank or the other.
+        let mut gave_m = [0.0; MAX_CELLS];
+        if self.deviations.play_m > 0.0 {
+            let half_m = 0.5 * self.deviations.play_m;
+            for (cell, gave_m) in gave_m.iter_mut().enumerate().take(self.cells) {
+                let load_n = self.tips[cell].elastic_n + self.weight_n / self.cells as f64;
+                let before_m = self.in_play_m[cell];
+                self.in_play_m[cell] = (before_m + load_n / GREASE_N_S_PER_M * step_s).clamp(-half_m, half_m);
+                *gave_m = self.in_play_m[cell] - before_m;
+            }
+        }
         let extended_m: f64 = (0..self.cells)
-            .map(|cell| extension_m[cell] - self.extension_m[cell])
+            .map(|cell| extension_m[cell] - self.extension_m[cell] - gave_m[cell])
             .sum();
         let work_j: f64 = (0..self.cells)
             .map(|cell| {
@@ -267,7 +284,7 @@ impl<'a> Motion<'a> {
             .sum::<f64>();
         self.translation_m_s = (self.momentum_n_s - cell_kg * extended_m / step_s) / self.mass_kg;
         for (cell, extension_m) in extension_m.into_iter().enumerate().take(self.cells) {
-            let displacement_m = extension_m - self.extension_m[cell] + self.translation_m_s * step_s;
+            let displacement_m = extension_m - self.extension_m[cell] - gave_m[cell] + self.translation_m_s * step_s;
             let limits = self.limits(cell, now);
             self.position_m[cell] += displacement_m;
             self.velocity_m_s[cell] = displacement_m / step_s;

@@ -14,7 +14,6 @@ pub struct CamProfile {
     /// Place of each cell in the step order, from 0.
     slot: [f64; MAX_CELLS],
     rounding: f64,
-    play_m: f64,
     overlap: f64,
     /// What makes the strokes differ from cycle to cycle.
     changing: Option<UnmodelledEffect>,
@@ -39,7 +38,6 @@ impl CamProfile {
             stroke_m: deviations.stroke_factor.map(|factor| factor * parameters.stroke_m),
             slot,
             rounding: parameters.rounding,
-            play_m: deviations.play_m,
             overlap: deviations.overlap,
             changing: unmodelled.filter(|unmodelled| unmodelled.changes_stroke()).cloned(),
             wave_m,
@@ -55,13 +53,12 @@ impl CamProfile {
             let done = ((begun - turns * cells) / (1.0 + self.overlap)).min(1.0);
             let (factor, factors) = self.factors(cell, turns);
             let stroke_m = self.stroke_m[cell];
-            let displacement_m = (stroke_m * factor * self.fraction(done) - self.play_m).max(0.0);
             let wave_m = if done < 1.0 && self.wave_m[cell] != 0.0 {
                 self.wave_m[cell] * (TAU * done).sin()
             } else {
                 0.0
             };
-            stroke_m * factors - turns * self.play_m + displacement_m + wave_m
+            stroke_m * (factors + factor * self.fraction(done)) + wave_m
         })
     }
 

@@ -3,6 +3,7 @@
 use super::{Crawl, Increment, Trial};
 use crate::mechanics::Mechanics;
 use crate::pad::{Hold, Loaded, Pad, PadLaw, Rate};
+use crate::play::Play;
 use crate::table::{Slopes, Tables, Whereabouts};
 use crate::worm::SlidesDown;
 
@@ -106,6 +107,7 @@ impl Crawl {
                 pad: &cell.pad,
                 rate: increment.rate,
                 compliance_m_per_n: laws.compliance_m_per_n,
+                play: trial.play.map(|play| (play, cell.behind_m)),
             };
             let (shift_m, loaded, gives) = way.load(trial.driven_m + translation_m, &mut trial.hold);
             (trial.shift_m, trial.loaded) = (shift_m, loaded);
@@ -182,17 +184,18 @@ struct Way<'a> {
     pad: &'a Pad,
     rate: Rate,
     compliance_m_per_n: f64,
+    play: Option<(Play, f64)>, // and where in it the cell was, m
 }
 
 impl Way<'_> {
     /// The cell's displacement when its drive moves by `driven_m`, the state of its tip, and the derivative of the displacement.
     #[inline]
     fn load(&self, driven_m: f64, hold: &mut Hold) -> (f64, Loaded, f64) {
-        if self.compliance_m_per_n == 0.0 {
+        if self.compliance_m_per_n == 0.0 && self.play.is_none() {
             let loaded = self.law.load(self.pad, driven_m, hold, self.rate);
             return (driven_m, loaded, 1.0);
         }
-        if self.law.presliding > 0.0 && self.law.is_linear() {
+        if self.law.presliding > 0.0 && self.law.is_linear() && self.play.is_none() {
             let compliance = self.compliance_m_per_n;
             let loaded = self.law.load_bristles(self.pad, driven_m, hold, self.rate, compliance);
             let shift_m = driven_m - compliance * (loaded.force_n - self.pad.force_n);
@@ -201,14 +204,23 @@ impl Way<'_> {
         self.load_yielding(driven_m, hold)
     }
 
-    /// The cell yields by C (F − F before): a monotone equation, solved like that of the body.
+    /// How far a contact force pushes the cell back in the drive's play in the increment, m, and the derivative of that, m/N.
+    fn gives(&self, contact_n: f64) -> (f64, f64) {
+        self.play.map_or((0.0, 0.0), |(play, before_m)| {
+            let (behind_m, m_per_n) = play.behind_m(contact_n);
+            (behind_m - before_m, m_per_n)
+        })
+    }
+
+    /// The cell yields by C (F − F before), and within its play: a monotone equation, solved like that of the body.
     fn load_yielding(&self, driven_m: f64, hold: &mut Hold) -> (f64, Loaded, f64) {
         let compliance = self.compliance_m_per_n;
         let (mut low_m, mut high_m) = (f64::NEG_INFINITY, f64::INFINITY);
         let mut shift_m = driven_m / (1.0 + compliance * self.law.stiffness_n_per_m);
         let mut loaded = self.law.load(self.pad, shift_m, hold, self.rate);
         for _ in 0..MAX_ITERATIONS {
-            let excess_m = shift_m + compliance * (loaded.force_n - self.pad.force_n) - driven_m;
+            let (gives_m, play_m_per_n) = self.gives(loaded.force_n);
+            let excess_m = shift_m + compliance * (loaded.force_n - self.pad.force_n) + gives_m - driven_m;
             if excess_m.abs() <= OWN_WAY_M || high_m - low_m < NARROW_M {
                 break;
             }
@@ -217,7 +229,7 @@ impl Way<'_> {
             } else {
                 low_m = shift_m;
             }
-            let newton_m = shift_m - excess_m / (1.0 + compliance * loaded.tangent_n_per_m);
+            let newton_m = shift_m - excess_m / (1.0 + (compliance + play_m_per_n) * loaded.tangent_n_per_m);
             let is_within = newton_m > low_m && newton_m < high_m;
             shift_m = if is_within || !(low_m.is_finite() && high_m.is_finite()) {
                 newton_m
@@ -226,6 +238,7 @@ impl Way<'_> {
             };
             loaded = self.law.load(self.pad, shift_m, hold, self.rate);
         }
-        (shift_m, loaded, 1.0 / (1.0 + compliance * loaded.tangent_n_per_m))
+        let yields_m_per_n = compliance + self.gives(loaded.force_n).1;
+        (shift_m, loaded, 1.0 / (1.0 + yields_m_per_n * loaded.tangent_n_per_m))
     }
 }

@@ -44,7 +44,7 @@ fn strong() -> Vec<Setting> {
 fn strong_value(parameter: &Parameter) -> f64 {
     match parameter.name {
         "from_m" => 0.02,
-        "length_m" | "time_constant_s" | "slip_m" | "grip_s" => parameter.neutral,
+        "length_m" | "time_constant_s" | "slip_m" | "grip_s" | "damping_n_s_per_m" => parameter.neutral,
         _ => {
             let strong = 15.0 * parameter.notable;
             let is_room_above = parameter.neutral + strong <= parameter.max;

@@ -134,6 +134,12 @@ impl Effect {
         &self.parameters[0]
     }
 
+    /// The value of a parameter that was left out: a shape has a usual one, unless it is a place in the canal.
+    pub(super) fn usual(&self, parameter: &Parameter) -> Option<f64> {
+        let has_usual = matches!(self.shape_starts, ShapeStarts::Grid(_)) && parameter.name != self.severity().name;
+        has_usual.then_some(parameter.neutral)
+    }
+
     /// Whether positions show it, given whether the gait phase was recorded.
     pub fn is_visible_in_positions(&self, phase_recorded: bool) -> bool {
         match self.visible {

@@ -60,27 +60,41 @@ pub(super) static ACTUATOR_COMPLIANCE: Effect = Effect {
 pub(super) static BACKLASH: Effect = Effect {
     name: "backlash",
     sentence: "Play between the drive and a cell must be run through before the cell follows.",
-    formula: "extension = max(0, Ls u − p)",
-    signature: "each step starts late and ends short",
+    formula: "Xᵢ = drive − z, |z| ≤ ½ p, between the flanks Xᵢ′ = body − Fᵢ / c",
+    signature: "each step starts late and ends short; the cell comes forward again when its load turns",
     twins: &[],
     described_twins: &[],
     separated_by: "encoder",
     scope: Scope::Worm,
     visible: Visible::RecordedPhase,
-    parameters: &[Parameter {
-        name: "play_m",
-        unit: "m",
-        about: "play",
-        neutral: 0.0,
-        min: 0.0,
-        max: 0.005,
-        notable: 2e-5,
-    }],
-    shape_starts: ShapeStarts::Neutral,
+    parameters: &[
+        Parameter {
+            name: "play_m",
+            unit: "m",
+            about: "play",
+            neutral: 0.0,
+            min: 0.0,
+            max: 0.005,
+            notable: 2e-5,
+        },
+        Parameter {
+            name: "damping_n_s_per_m",
+            unit: "N s/m",
+            about: "c, damping of a cell against the body while it crosses the play",
+            neutral: 20.0,
+            min: 1.0,
+            max: 300.0,
+            notable: 10.0,
+        },
+    ],
+    shape_starts: ShapeStarts::Grid(&[&[10.0, 60.0]]),
     sense: Sense::Either,
     care: None,
     may_begin: true,
-    apply: Apply::Worm(|physics, _, values| physics.laws.play_m += values[0]),
+    apply: Apply::Worm(|physics, _, values| {
+        physics.laws.play_m += values[0];
+        physics.laws.play_damping_n_s_per_m = values[1];
+    }),
 };
 
 /// A cam whose ramps overlap.

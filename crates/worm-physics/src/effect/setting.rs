@@ -104,12 +104,13 @@ impl Setting {
         }
         let mut values = Vec::with_capacity(effect.parameters.len());
         for parameter in effect.parameters {
-            let value = parameters.get(parameter.name).ok_or(SettingError::Missing {
+            let given = parameters.get(parameter.name).copied();
+            let value = given.or_else(|| effect.usual(parameter)).ok_or(SettingError::Missing {
                 effect: effect.name,
                 parameter: parameter.name,
                 about: parameter.about,
             })?;
-            values.push(*value);
+            values.push(value);
         }
         Self::new(effect, cell, &values, cells)
     }

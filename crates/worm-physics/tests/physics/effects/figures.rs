@@ -53,10 +53,11 @@ fn advances_on_the_level_are_the_closed_forms() {
             1e-9,
         ),
         (
+            // From one flank to the other each pad goes further by the play.
             "play",
-            &[effect("backlash", &[1e-3])],
+            &[effect("backlash", &[1e-3, 1.0])],
             CYCLE_S,
-            level_m(STROKE_M - 1e-3, BOUND_M),
+            level_m(STROKE_M, BOUND_M + 0.5e-3),
             1e-8,
         ),
         // The peak at breakaway is over when the step ends; what rest restores at this speed is not.
