@@ -23,6 +23,7 @@ SPLITS = {
     "development-clean": (41_700_000, (40, 0, 0, 0)),
     "development-single": (41_800_000, (0, 220, 0, 0)),
     "sealed": (73_200_000, (66, 132, 54, 12)),
+    "sealed-single": (73_400_000, (0, 132, 0, 0)),
 }
 KINDS = ("clean", "single", "stranger", "onset")
 # How large campaigns are where they are not of the usual size.

@@ -6,6 +6,7 @@ mod convergence;
 mod damper;
 mod energy_balance;
 mod memory;
+mod play;
 mod tables;
 
 use crate::Worm;

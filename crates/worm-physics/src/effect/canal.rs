@@ -22,6 +22,7 @@ pub(super) static SLOPE_ERROR: Effect = Effect {
         min: -15.0,
         max: 15.0,
         notable: 0.15,
+        none_at_min: false,
     }],
     shape_starts: ShapeStarts::Neutral,
     sense: Sense::Either,
@@ -50,6 +51,7 @@ pub(super) static SLICK_PATCH: Effect = Effect {
             min: 0.1,
             max: 1.0,
             notable: 0.05,
+            none_at_min: false,
         },
         Parameter {
             name: "from_m",
@@ -59,6 +61,7 @@ pub(super) static SLICK_PATCH: Effect = Effect {
             min: -10.0,
             max: 10.0,
             notable: 0.01,
+            none_at_min: false,
         },
         Parameter {
             name: "length_m",
@@ -68,6 +71,7 @@ pub(super) static SLICK_PATCH: Effect = Effect {
             min: 0.005,
             max: 0.5,
             notable: 0.01,
+            none_at_min: false,
         },
     ],
     shape_starts: ShapeStarts::AlongCanal {
@@ -105,6 +109,7 @@ pub(super) static SLOPE_CLAMPING: Effect = Effect {
         min: -2.0,
         max: 3.0,
         notable: 0.05,
+        none_at_min: false,
     }],
     shape_starts: ShapeStarts::Neutral,
     sense: Sense::Either,

@@ -57,10 +57,17 @@ pub struct Parameter {
     pub max: f64,
     /// A change of it that is usually just noticed: the scale of searches and derivatives.
     pub notable: f64,
+    /// Whether its least value stands for none of it: a shape that is as possible as any above.
+    pub none_at_min: bool,
 }
 
 impl Parameter {
-    /// Whether it is a fraction of a whole: the ends of its range are as possible as anything between them.
+    /// Whether an end of its range is as possible as anything between: of a fraction of a whole both are.
+    pub fn may_be_at_end(&self, value: f64) -> bool {
+        self.is_fraction() || self.none_at_min && value - self.min < self.max - value
+    }
+
+    /// Whether it is a fraction of a whole.
     pub fn is_fraction(&self) -> bool {
         self.unit.is_empty() && (self.min, self.max) == (0.0, 1.0)
     }

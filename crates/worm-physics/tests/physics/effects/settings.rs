@@ -66,6 +66,30 @@ fn values_are_taken_to_their_ends_and_not_beyond() {
     }
 }
 
+/// A shape that is left out has its usual value, a severity or a place in the canal none.
+#[test]
+fn a_shape_that_is_left_out_is_the_usual_one() {
+    let given = |name: &str, parameters: &[(&str, f64)]| {
+        let parameters: BTreeMap<String, f64> = parameters
+            .iter()
+            .map(|(name, value)| ((*name).to_owned(), *value))
+            .collect();
+        Setting::by_names(name, None, &parameters, 4).map(|setting| setting.values().to_vec())
+    };
+    assert_eq!(given("backlash", &[("play_m", 1e-3)]).expect("complete"), [1e-3, 20.0]);
+    assert_eq!(
+        given("pad-creep", &[("creep_share", 0.4)]).expect("complete"),
+        [0.4, 0.5]
+    );
+    for (name, parameters, missing) in [
+        ("backlash", &[("damping_n_s_per_m", 5.0)][..], "play_m"),
+        ("slick-patch", &[("friction_factor", 0.5), ("length_m", 0.02)], "from_m"),
+    ] {
+        let error = given(name, parameters).expect_err("incomplete").to_string();
+        assert!(error.contains(missing), "{error}");
+    }
+}
+
 /// An effect that names a cell needs designs that have it.
 #[test]
 fn a_study_refuses_an_effect_on_a_cell_that_a_design_lacks() {

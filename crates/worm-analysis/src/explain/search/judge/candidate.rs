@@ -86,8 +86,11 @@ impl Candidate {
         let free = self.fit.hypothesis.free.iter().enumerate();
         let mut shapes = free.filter(|(_, free)| match free.what {
             What::Effect { place, parameter } => {
-                let is_fraction = || self.hypothesised[place].effect.parameters[parameter].is_fraction();
-                parameter > 0 && self.trace != Some(place) && !is_fraction()
+                let may_be_at_end = || {
+                    let shape = &self.hypothesised[place].effect.parameters[parameter];
+                    shape.may_be_at_end(settings[place].values()[parameter])
+                };
+                parameter > 0 && self.trace != Some(place) && !may_be_at_end()
             }
             What::Nuisance(_) | What::Law(_) => false,
         });
