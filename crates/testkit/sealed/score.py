@@ -59,7 +59,7 @@ def is_named(line: Line) -> bool:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("lines", type=Path, help="mujoco.csv, own.csv, own-958f6c4.csv or own-e61e7d6.csv")
+    parser.add_argument("lines", type=Path, help="mujoco.csv, own.csv, or one named after the bed and the commit")
     with parser.parse_args().lines.open(newline="") as file:
         lines = list(csv.DictReader(file))
     refused = [line for line in lines if line["verdict"] == "failed" and line["artefacts"]]

@@ -89,7 +89,6 @@ struct Trial {
     friction: f64,
     hold: Hold,
     shift_m: f64,
-    play: Option<Play>, // of the drive, where there is any
     loaded: Loaded,
     /// At the increment's start, for tables.
     here: Whereabouts,
@@ -103,6 +102,8 @@ struct Trial {
 struct Increment {
     step_s: f64,
     rate: Rate,
+    is_drive_rigid: bool,
+    play: Option<Play>,            // of the drive, where there is any
     remembered: [f64; MAX_TABLES], // by each table, a fraction
     drag_n_per_m: f64,
     inertia_n_per_m: f64, // 0 without mass
@@ -380,12 +381,6 @@ impl Crawl {
                 cell.trial.driven_m += target_m[0] - before_m[0] + follows_m;
             }
             cell.trial.hold = mechanics.pad[index].hold(&cell.pad, cell.trial.friction, step_s);
-            cell.trial.play = (laws.play_m > 0.0).then(|| Play {
-                half_m: 0.5 * laws.play_m,
-                behind_m: cell.behind_m + cell.trial.driven_m,
-                yields_m_per_n: step_s / laws.play_damping_n_s_per_m,
-                standing_n: mechanics.standing_n[index],
-            });
         }
         let (damping_n_s_per_m, mass_kg) = match self.damping_ratio {
             Some(ratio) => (ratio * mechanics.critical_n_s_per_m, mechanics.mass_kg),
@@ -401,6 +396,11 @@ impl Crawl {
                 },
                 damping_n_per_m: damping_n_s_per_m / step_s,
             },
+            is_drive_rigid: laws.compliance_m_per_n == 0.0 && laws.play_m == 0.0,
+            play: (laws.play_m > 0.0).then(|| Play {
+                half_m: 0.5 * laws.play_m,
+                yields_m_per_n: step_s / laws.play_damping_n_s_per_m,
+            }),
             remembered: tables.map_or([0.0; MAX_TABLES], |tables| tables.remembered_after(step_s)),
             drag_n_per_m: laws.drag_n_s_per_m / step_s,
             inertia_n_per_m: 4.0 * mass_kg / (step_s * step_s),
@@ -434,15 +434,14 @@ impl Crawl {
                 shift_m,
                 loaded,
                 pushed_n,
-                play,
                 ..
             } = cell.trial;
             let (law, standing_n) = (&mechanics.pad[index], mechanics.standing_n[index]);
             let (before_m, before_n) = (cell.pad.deformation_m, cell.pad.force_n);
             let mut lost_j = law.take(&mut cell.pad, &loaded, increment.step_s, increment.rate);
-            if let Some(play) = play {
+            if let Some(play) = increment.play {
                 // As if the drive bore the load across the play, too: it is small there.
-                let behind_m = play.behind_m(loaded.force_n).0;
+                let behind_m = play.behind_m(cell.behind_m + driven_m, loaded.force_n + standing_n).0;
                 lost_j += (0.5 * (before_n + loaded.force_n) + standing_n) * (behind_m - cell.behind_m);
                 cell.behind_m = behind_m;
             }

@@ -5,23 +5,19 @@
 //! flank until its pad is relieved, and waits there while the drive crosses the play; later, when its pad is relieved the other way,
 //! it comes forward by as much while the body goes back.
 
-/// The play of one cell in one increment.
-#[derive(Debug, Clone, Copy, Default)]
+/// The play of every cell's drive in one increment.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Play {
     pub half_m: f64,
-    /// How far back from the middle the cell would be at the increment's end if it stayed where it is in the body, m.
-    pub behind_m: f64,
-    /// How far a newton of load pushes it in the increment, m/N.
+    /// How far a newton of load pushes a cell that is between the flanks, m/N.
     pub yields_m_per_n: f64,
-    /// Load beside the contact force, N.
-    pub standing_n: f64,
 }
 
 impl Play {
-    /// How far back from the middle a contact force has the cell at the increment's end, m, and the derivative of that, m/N. Without play
-    /// it keeps to its place.
-    pub fn behind_m(&self, contact_n: f64) -> (f64, f64) {
-        let free_m = self.behind_m + self.yields_m_per_n * (contact_n + self.standing_n);
+    /// How far back from the middle a load has a cell at the increment's end, m, and the derivative of that, m/N, where it would be
+    /// `resting_m` back if it stayed where it is in the body.
+    pub fn behind_m(&self, resting_m: f64, load_n: f64) -> (f64, f64) {
+        let free_m = resting_m + self.yields_m_per_n * load_n;
         if free_m.abs() < self.half_m {
             (free_m, self.yields_m_per_n)
         } else {

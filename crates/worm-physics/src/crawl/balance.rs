@@ -102,14 +102,23 @@ impl Crawl {
         let tables = mechanics.tables.have_force().then_some(&mechanics.tables);
         for (index, (cell, law)) in self.cell[..self.cells].iter_mut().zip(&mechanics.pad).enumerate() {
             let trial = &mut cell.trial;
-            let way = Way {
-                law,
-                pad: &cell.pad,
-                rate: increment.rate,
-                compliance_m_per_n: laws.compliance_m_per_n,
-                play: trial.play.map(|play| (play, cell.behind_m)),
+            let driven_m = trial.driven_m + translation_m;
+            let (shift_m, loaded, gives) = if increment.is_drive_rigid {
+                let loaded = law.load(&cell.pad, driven_m, &mut trial.hold, increment.rate);
+                (driven_m, loaded, 1.0)
+            } else {
+                let way = Way {
+                    law,
+                    pad: &cell.pad,
+                    rate: increment.rate,
+                    compliance_m_per_n: laws.compliance_m_per_n,
+                    play: increment.play,
+                    behind_m: cell.behind_m,
+                    resting_m: cell.behind_m + trial.driven_m,
+                    standing_n: mechanics.standing_n[index],
+                };
+                way.load(driven_m, &mut trial.hold)
             };
-            let (shift_m, loaded, gives) = way.load(trial.driven_m + translation_m, &mut trial.hold);
             (trial.shift_m, trial.loaded) = (shift_m, loaded);
             excess_n += loaded.force_n + drag * shift_m;
             slope_n_per_m += (loaded.tangent_n_per_m + drag) * gives;
@@ -178,23 +187,21 @@ fn push(
     (trial.standing_n + moving_n, moving_slope)
 }
 
-/// A cell, between its drive and its tip.
+/// A cell, between a drive that yields to it and its tip.
 struct Way<'a> {
     law: &'a PadLaw,
     pad: &'a Pad,
     rate: Rate,
     compliance_m_per_n: f64,
-    play: Option<(Play, f64)>, // and where in it the cell was, m
+    play: Option<Play>,
+    behind_m: f64,  // in the play, at the increment's start
+    resting_m: f64, // at its end if it stays where it is in the body
+    standing_n: f64,
 }
 
 impl Way<'_> {
     /// The cell's displacement when its drive moves by `driven_m`, the state of its tip, and the derivative of the displacement.
-    #[inline]
     fn load(&self, driven_m: f64, hold: &mut Hold) -> (f64, Loaded, f64) {
-        if self.compliance_m_per_n == 0.0 && self.play.is_none() {
-            let loaded = self.law.load(self.pad, driven_m, hold, self.rate);
-            return (driven_m, loaded, 1.0);
-        }
         if self.law.presliding > 0.0 && self.law.is_linear() && self.play.is_none() {
             let compliance = self.compliance_m_per_n;
             let loaded = self.law.load_bristles(self.pad, driven_m, hold, self.rate, compliance);
@@ -206,9 +213,9 @@ impl Way<'_> {
 
     /// How far a contact force pushes the cell back in the drive's play in the increment, m, and the derivative of that, m/N.
     fn gives(&self, contact_n: f64) -> (f64, f64) {
-        self.play.map_or((0.0, 0.0), |(play, before_m)| {
-            let (behind_m, m_per_n) = play.behind_m(contact_n);
-            (behind_m - before_m, m_per_n)
+        self.play.map_or((0.0, 0.0), |play| {
+            let (behind_m, m_per_n) = play.behind_m(self.resting_m, contact_n + self.standing_n);
+            (behind_m - self.behind_m, m_per_n)
         })
     }
 
