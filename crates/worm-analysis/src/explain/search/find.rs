@@ -147,8 +147,7 @@ pub(in crate::explain) fn find<P: Plant>(
     let best = best.and_then(|best| best.evidence).unwrap_or(judge.none);
     if problem.plant.has_cycles() {
         report("onsets", 0.6);
-        candidates.extend(with_onsets(&judge, &nominal, &screened, judge.may_change(&best)));
-        candidates.sort_by(|a, b| judge.ln_odds(b).total_cmp(&judge.ln_odds(a)));
+        candidates = with_onsets(&judge, &nominal, &screened, candidates, judge.may_change(&best));
     }
     report("pairs", 0.65);
     let mut pairs: Vec<(Candidate, f64)> = Vec::new();

@@ -15,6 +15,7 @@ use self::try_out::try_out;
 use super::fit::Fit;
 use super::hypothesis::Hypothesis;
 use super::judge::candidate::Candidate;
+use super::judge::decision::LAW_KNOWN;
 use super::judge::ln_sum::ln_sum;
 use super::judge::prior::NONE;
 use super::judge::structural_change::Change;
@@ -97,7 +98,11 @@ fn onsets(plant: &impl Recorded, course: Course) -> Vec<Onset> {
         .collect()
 }
 
-/// The effects that most probably begin or end in mid-run, fitted with the time. `screened` are those that act throughout.
+/// The effects that act `throughout`, and those that most probably begin or end in mid-run, fitted with the time; weighed, most probable
+/// first. `screened` are all that act throughout.
+///
+/// A time is no sign that an effect begins or ends where it adds no more to what the effect does without it than its law may be wrong by:
+/// a law that is not quite right is mended a little by leaving out what is at the edge of a run.
 ///
 /// What stays, once it has begun or ended, is looked for where the data `may_change`. What comes and goes need not show as a change that
 /// stays, so it is screened in any case, and fitted where that speaks for it.
@@ -105,6 +110,7 @@ pub(in crate::explain) fn with_onsets(
     judge: &Judge<'_, impl Plant>,
     nominal: &Fit,
     screened: &[Screening],
+    throughout: Vec<Candidate>,
     may_change: bool,
 ) -> Vec<Candidate> {
     let courses = FITTED
@@ -125,7 +131,7 @@ pub(in crate::explain) fn with_onsets(
         let promising = try_out(judge, &base, promising, change, count);
         refit(judge.problem, &base, nominal, &promising, count)
     });
-    let mut candidates: Vec<Candidate> = fitted
+    let begun: Vec<Candidate> = fitted
         .flatten()
         .map(|candidate| {
             let (fit, ln_onset) = refine(judge.problem, in_best_run(judge.problem, candidate.fit));
@@ -135,8 +141,43 @@ pub(in crate::explain) fn with_onsets(
             }
         })
         .collect();
+    let throughout = throughout.into_par_iter().map(|one| fit_anew(judge, one, &begun));
+    let all: Vec<Candidate> = throughout.chain(begun.par_iter().cloned()).collect();
+    let is_needed = |one: &&Candidate| !all.iter().any(|simpler| says_as_much(simpler, one));
+    let mut candidates: Vec<Candidate> = all.iter().filter(is_needed).cloned().collect();
     judge.weigh(&mut candidates, screened);
     candidates
+}
+
+/// An effect throughout, fitted from the values of the best that begins or ends, where that is a better fit: what the time seems to do
+/// may be a better minimum.
+fn fit_anew(judge: &Judge<'_, impl Plant>, throughout: Candidate, begun: &[Candidate]) -> Candidate {
+    let best = begun
+        .iter()
+        .filter(|one| one.hypothesised[0].is_same_effect(&throughout.hypothesised[0]))
+        .max_by(|a, b| a.improvement.total_cmp(&b.improvement))
+        .filter(|best| best.improvement > throughout.improvement);
+    let anew = best.map(|best| {
+        let fit = judge.problem.fit(&throughout.fit.hypothesis, best.fit.at.clone(), None);
+        Candidate::of(judge.problem, judge.recalibrated, fit)
+    });
+    match anew {
+        Some(anew) if anew.improvement > throughout.improvement => anew,
+        _ => throughout,
+    }
+}
+
+/// Whether the same effect does as much with fewer times, but for what its law may be wrong by.
+fn says_as_much(simpler: &Candidate, one: &Candidate) -> bool {
+    let [with_fewer, with_more] = [simpler, one].map(|one| &one.hypothesised[0]);
+    let is_simpler = match (with_fewer.onset, with_more.onset) {
+        (None, Some(_)) => true,
+        (Some(fewer), Some(more)) => more.comes_and_goes() && !fewer.comes_and_goes() && fewer.run == more.run,
+        (_, None) => false,
+    };
+    is_simpler
+        && with_fewer.is_same_effect(with_more)
+        && one.improvement - simpler.improvement <= LAW_KNOWN * LAW_KNOWN * simpler.improvement
 }
 
 /// The model recalibrated on what was seen before a change, or after it where something ends there: the rest would drive the
@@ -297,8 +338,58 @@ mod tests {
     use super::*;
     use crate::experiment::{RecordedRun, Simulation};
     use crate::explain::fixture::{Campaign, begun, record_under};
+    use crate::explain::search::parameter::Hypothesised;
     use crate::explain::{Answer, Options, Verdict, explain};
+    use crate::least_squares::Estimate;
     use worm_estimator::config::Config;
+    use worm_physics::effect::named;
+
+    /// An effect with a time, or throughout, that improves the fit by so much.
+    fn candidate(name: &str, onset: Option<Onset>, improvement: f64) -> Candidate {
+        let effect = named(name).expect("an effect");
+        let hypothesised = vec![Hypothesised {
+            onset,
+            ..Hypothesised::throughout(effect, None)
+        }];
+        let estimate = Estimate {
+            at: effect.values_with_neutral_shape(effect.severity().neutral),
+            residual: Vec::new(),
+            jacobian: Vec::new(),
+            chi_squared: 0.0,
+            converged: true,
+        };
+        Candidate {
+            fit: Fit::new(&Hypothesis::new(&[], &hypothesised), estimate),
+            hypothesised,
+            improvement,
+            ln_onset: 0.0,
+            evidence: None,
+            held_out: None,
+            trace: None,
+        }
+    }
+
+    /// One per cent more than without it is what a law that is known to a tenth may owe to it.
+    #[test]
+    fn a_time_must_do_more_than_a_law_may_be_wrong_by() {
+        let ends = Some(Onset::until(9.9, Some(2)));
+        let both = ends.map(|ends| Onset {
+            begins: Some(4.0),
+            ..ends
+        });
+        let throughout = candidate("backlash", None, 10_000.0);
+        assert!(says_as_much(&throughout, &candidate("backlash", ends, 10_099.0)));
+        assert!(!says_as_much(&throughout, &candidate("backlash", ends, 10_101.0)));
+        assert!(!says_as_much(&throughout, &candidate("pad-creep", ends, 10_099.0)));
+        assert!(!says_as_much(&candidate("backlash", ends, 10_099.0), &throughout));
+        let in_another_run = Some(Onset::until(9.9, Some(1)));
+        let once = |onset| candidate("backlash", onset, 20_000.0);
+        assert!(says_as_much(&once(ends), &candidate("backlash", both, 20_100.0)));
+        assert!(!says_as_much(
+            &once(in_another_run),
+            &candidate("backlash", both, 20_100.0)
+        ));
+    }
 
     /// The answer about worms of the usual campaign under which an effect begins or ends.
     fn answer(truth: (&str, Option<usize>, &[f64]), onset: Onset) -> Answer {

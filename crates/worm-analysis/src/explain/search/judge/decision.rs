@@ -35,7 +35,7 @@ const RIVAL: f64 = 0.02;
 const SECOND: f64 = 20.0;
 /// How well the law of an effect is known, as a fraction of the positions that it moves: what is left beside it may be that without
 /// anything else being wrong, and a second effect must do more, for that has a law which may fit what is left by chance.
-const LAW_KNOWN: f64 = 0.1;
+pub(in crate::explain) const LAW_KNOWN: f64 = 0.1;
 const FIRST_LAW_KNOWN: f64 = 0.15;
 /// Largest part of the sum that may be left out.
 const NOTHING: f64 = 1e-300;
