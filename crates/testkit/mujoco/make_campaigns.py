@@ -24,6 +24,7 @@ SPLITS = {
     "development-single": (41_800_000, (0, 220, 0, 0)),
     "sealed": (73_200_000, (66, 132, 54, 12)),
     "sealed-single": (73_400_000, (0, 132, 0, 0)),
+    "sealed-stranger": (73_500_000, (0, 0, 54, 0)),
 }
 KINDS = ("clean", "single", "stranger", "onset")
 # How large campaigns are where they are not of the usual size.
@@ -32,17 +33,21 @@ SIZE_OF = {"sample": "small", "development-clean": "varied"}
 ATTEMPTS = 10
 
 
+def strangers_of(split: str) -> dict:
+    """The kinds of strangers of a split: those of a sealed one are never tuned on."""
+    return effects.STRANGERS["sealed" if split.startswith("sealed") else "development"]
+
+
 def cases(split: str) -> list:
     """(name, kind, what is hidden, seed) of every campaign of a split."""
     base, counts = SPLITS[split]
-    strangers = effects.STRANGERS["sealed" if split == "sealed" else "development"]
     out = []
     for kind, count in zip(KINDS, counts):
         group = KINDS.index(kind)
         names = {
             "clean": [None],
             "single": list(effects.LIBRARY),
-            "stranger": list(strangers),
+            "stranger": list(strangers_of(split)),
             "onset": list(effects.WITH_ONSET),
         }[kind]
         for number in range(count):
@@ -56,8 +61,7 @@ def hider(split: str, kind: str, what):
     """The function that draws what is hidden."""
     if what is None:
         return lambda rng, worm: []
-    strangers = effects.STRANGERS["sealed" if split == "sealed" else "development"]
-    table = strangers if kind == "stranger" else effects.LIBRARY
+    table = strangers_of(split) if kind == "stranger" else effects.LIBRARY
     return lambda rng, worm: [table[what](rng, worm)]
 
 
