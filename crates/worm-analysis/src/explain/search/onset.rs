@@ -23,7 +23,7 @@ use super::judgement::Judge;
 use super::parameter::Onset;
 use super::plant::{Plant, Recorded};
 use super::problem::FitProblem;
-use super::refit::refit;
+use super::refit::{from_values_of, refit};
 use super::score_test::{Screening, ln_bayes, strong};
 use crate::least_squares::{cross, dot, submatrix};
 use nalgebra::{DMatrix, DVector};
@@ -102,7 +102,7 @@ fn onsets(plant: &impl Recorded, course: Course) -> Vec<Onset> {
 /// first. `screened` are all that act throughout.
 ///
 /// A time is no sign that an effect begins or ends where it adds no more to what the effect does without it than its law may be wrong by:
-/// a law that is not quite right is mended a little by leaving out what is at the edge of a run.
+/// leaving out the edge of a run hides a little of the error of any law.
 ///
 /// What stays, once it has begun or ended, is looked for where the data `may_change`. What comes and goes need not show as a change that
 /// stays, so it is screened in any case, and fitted where that speaks for it.
@@ -141,10 +141,20 @@ pub(in crate::explain) fn with_onsets(
             }
         })
         .collect();
-    let throughout = throughout.into_par_iter().map(|one| fit_anew(judge, one, &begun));
-    let all: Vec<Candidate> = throughout.chain(begun.par_iter().cloned()).collect();
-    let is_needed = |one: &&Candidate| !all.iter().any(|simpler| says_as_much(simpler, one));
-    let mut candidates: Vec<Candidate> = all.iter().filter(is_needed).cloned().collect();
+    if begun.is_empty() {
+        return throughout;
+    }
+    let mut candidates: Vec<Candidate> = throughout
+        .into_par_iter()
+        .map(|one| fit_anew(judge, one, &begun))
+        .collect();
+    candidates.extend(begun);
+    let mut is_needed = candidates
+        .iter()
+        .map(|one| !candidates.iter().any(|simpler| explains_as_much(simpler, one)))
+        .collect::<Vec<bool>>()
+        .into_iter();
+    candidates.retain(|_| is_needed.next() == Some(true));
     judge.weigh(&mut candidates, screened);
     candidates
 }
@@ -152,23 +162,17 @@ pub(in crate::explain) fn with_onsets(
 /// An effect throughout, fitted from the values of the best that begins or ends, where that is a better fit: what the time seems to do
 /// may be a better minimum.
 fn fit_anew(judge: &Judge<'_, impl Plant>, throughout: Candidate, begun: &[Candidate]) -> Candidate {
-    let best = begun
+    let anew = begun
         .iter()
         .filter(|one| one.hypothesised[0].is_same_effect(&throughout.hypothesised[0]))
         .max_by(|a, b| a.improvement.total_cmp(&b.improvement))
-        .filter(|best| best.improvement > throughout.improvement);
-    let anew = best.map(|best| {
-        let fit = judge.problem.fit(&throughout.fit.hypothesis, best.fit.at.clone(), None);
-        Candidate::of(judge.problem, judge.recalibrated, fit)
-    });
-    match anew {
-        Some(anew) if anew.improvement > throughout.improvement => anew,
-        _ => throughout,
-    }
+        .filter(|best| best.improvement > throughout.improvement)
+        .and_then(|best| from_values_of(judge.problem, judge.recalibrated, &throughout, (best, 0)));
+    anew.unwrap_or(throughout)
 }
 
-/// Whether the same effect does as much with fewer times, but for what its law may be wrong by.
-fn says_as_much(simpler: &Candidate, one: &Candidate) -> bool {
+/// Whether the same effect explains as much with fewer times, but for what its law may be wrong by.
+fn explains_as_much(simpler: &Candidate, one: &Candidate) -> bool {
     let [with_fewer, with_more] = [simpler, one].map(|one| &one.hypothesised[0]);
     let is_simpler = match (with_fewer.onset, with_more.onset) {
         (None, Some(_)) => true,
@@ -378,14 +382,14 @@ mod tests {
             ..ends
         });
         let throughout = candidate("backlash", None, 10_000.0);
-        assert!(says_as_much(&throughout, &candidate("backlash", ends, 10_099.0)));
-        assert!(!says_as_much(&throughout, &candidate("backlash", ends, 10_101.0)));
-        assert!(!says_as_much(&throughout, &candidate("pad-creep", ends, 10_099.0)));
-        assert!(!says_as_much(&candidate("backlash", ends, 10_099.0), &throughout));
+        assert!(explains_as_much(&throughout, &candidate("backlash", ends, 10_099.0)));
+        assert!(!explains_as_much(&throughout, &candidate("backlash", ends, 10_101.0)));
+        assert!(!explains_as_much(&throughout, &candidate("pad-creep", ends, 10_099.0)));
+        assert!(!explains_as_much(&candidate("backlash", ends, 10_099.0), &throughout));
         let in_another_run = Some(Onset::until(9.9, Some(1)));
         let once = |onset| candidate("backlash", onset, 20_000.0);
-        assert!(says_as_much(&once(ends), &candidate("backlash", both, 20_100.0)));
-        assert!(!says_as_much(
+        assert!(explains_as_much(&once(ends), &candidate("backlash", both, 20_100.0)));
+        assert!(!explains_as_much(
             &once(in_another_run),
             &candidate("backlash", both, 20_100.0)
         ));

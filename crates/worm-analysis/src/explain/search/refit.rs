@@ -128,20 +128,30 @@ pub(in crate::explain) fn alone(
     single: &Candidate,
     pair: &Candidate,
 ) -> Option<Candidate> {
+    let place = pair.hypothesised.iter().position(|one| single.hypothesised == [*one])?;
+    from_values_of(problem, recalibrated, single, (pair, place))
+}
+
+/// A single effect refitted from the values of another candidate, in which it has this place, where that is a better fit.
+pub(in crate::explain) fn from_values_of(
+    problem: &FitProblem<'_, impl Plant>,
+    recalibrated: &Fit,
+    single: &Candidate,
+    (other, place_in_other): (&Candidate, usize),
+) -> Option<Candidate> {
     let hypothesis = &single.fit.hypothesis;
-    let place_in_pair = pair.hypothesised.iter().position(|one| single.hypothesised == [*one])?;
-    let from_pair = |what: What| {
+    let from_other = |what: What| {
         let what = match what {
             What::Effect { parameter, .. } => What::Effect {
-                place: place_in_pair,
+                place: place_in_other,
                 parameter,
             },
             nuisance => nuisance,
         };
-        let place = pair.fit.hypothesis.free.iter().position(|free| free.what == what)?;
-        Some(pair.fit.at[place])
+        let place = other.fit.hypothesis.free.iter().position(|free| free.what == what)?;
+        Some(other.fit.at[place])
     };
-    let at: Option<Vec<f64>> = hypothesis.free.iter().map(|free| from_pair(free.what)).collect();
+    let at: Option<Vec<f64>> = hypothesis.free.iter().map(|free| from_other(free.what)).collect();
     let candidate = Candidate {
         ln_onset: single.ln_onset,
         ..Candidate::of(problem, recalibrated, problem.fit(hypothesis, at?, None))
